@@ -729,9 +729,8 @@ def predict(case: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None)
     named, directory = case_and_run(case, out, changes)
     try:
         predicted = {**prediction.predict(named), "outside": prediction.outside_of_the_paper(named), "engine": None}
-    except ValueError as error:
-        key, _, why = str(error).partition(": ")
-        raise InputError(named.name, [Problem(key, None, why)]) from error
+    except prediction.NotApplicable as error:
+        raise InputError(named.name, [Problem(error.key, None, error.reason)]) from error
     with suppress(InputError):  # a result that cannot be read
         predicted["engine"] = directory and Run(directory, requested=named).result.as_dict()
     return predicted

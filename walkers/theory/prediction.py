@@ -52,17 +52,35 @@ def motion_of(*cases: Case) -> Motion:
     )
 
 
+class NotApplicable(ValueError):
+    """The theory does not apply to a case.
+
+    Attributes
+    ----------
+    key
+        The key of the case that the theory does not allow for.
+    reason
+        What it allows for.
+    """
+
+    def __init__(self, key: str, reason: str) -> None:
+        self.key = key
+        self.reason = reason
+        super().__init__(f"{key}: {reason}")
+
+
 def check_applies(*cases: Case) -> None:
-    """Raise ``ValueError`` with the key and the reason if the theory does not apply to a case."""
+    """Raise `NotApplicable` if the theory does not apply to a case."""
     for case in cases:
         if len(case.walkers) != 1 or len(case.walkers[0].radii) != 2 or case.loose:
-            raise ValueError("bodies: expected dimers; the theory is for dimers only")
+            raise NotApplicable("bodies", "expected dimers; the theory is for dimers only")
         if not case.boundary.bare:
-            raise ValueError("boundary.shape: the theory is for planes")
+            raise NotApplicable("boundary.shape", "the theory is for planes")
         if case.drive.ramp or not case.excitation.is_plain or case.excitation.direction[2] != 0.0:
-            raise ValueError("drive: the theory is for a single harmonic along the plane, without a phase or a ramp")
+            text = "the theory is for a single harmonic along the plane, without a phase or a ramp"
+            raise NotApplicable("drive", text)
         if hypot(*case.gravity_vector[:2]) > abs(case.axial_gravity) + 1e-9:
-            raise ValueError("boundary.uphill: the theory is for planes tilted along the drive")
+            raise NotApplicable("boundary.uphill", "the theory is for planes tilted along the drive")
 
 
 def threshold(case: Case) -> float:
@@ -279,8 +297,8 @@ def _why_not(case: Case, column: str) -> str | None:
     """Reason why the theory does not predict a column of a case."""
     try:
         check_applies(case)
-    except ValueError as error:
-        return str(error).partition(": ")[2]
+    except NotApplicable as error:
+        return error.reason
     if case.axial_gravity != 0.0 and column != "right_facing":
         return "on a slope the theory is for walkers that face up (column right_facing)"
     return None
