@@ -50,13 +50,43 @@ class Problem:
 
 
 class InputError(WalkersError):
-    """An unusable input: file (or other source), and all of its errors, at least one."""
+    """An unusable input.
+
+    Attributes
+    ----------
+    source
+        The file, option or argument that cannot be used.
+    problems
+        All of its problems, at least one. The message has a line for each.
+    """
 
     def __init__(self, source: str, problems: Sequence[Problem]) -> None:
         self.source = source
         self.problems = tuple(problems)
-        named = shortened(printable(source), _LONGEST_TEXT)
-        super().__init__("\n".join(f"{named}: {problem}" for problem in self.problems))
+        super().__init__(source, self.problems)
+
+    def __str__(self) -> str:
+        source = shortened(printable(self.source), _LONGEST_TEXT)
+        return "\n".join(f"{source}: {problem}" for problem in self.problems)
+
+    def renamed(self, name_of: Callable[[str], str]) -> InputError:
+        """The error with another name of its source, such as that of an option for an argument."""
+        return InputError(name_of(self.source), self.problems)
+
+
+class InputErrors(InputError):
+    """Errors of several inputs, each with its own source."""
+
+    def __init__(self, errors: Sequence[InputError]) -> None:
+        super().__init__(errors[0].source, [problem for error in errors for problem in error.problems])
+        self.errors = tuple(errors)
+
+    def __str__(self) -> str:
+        return "\n".join(dict.fromkeys(map(str, self.errors)))
+
+    def renamed(self, name_of: Callable[[str], str]) -> InputErrors:
+        """The errors with other names of their sources."""
+        return InputErrors([error.renamed(name_of) for error in self.errors])
 
 
 def refused(source: object, expected: str) -> InputError:
@@ -70,7 +100,7 @@ def unusable(key: str, expected: str, value: object = None) -> InputError:
 
 
 def apply_all(function: Callable[[T], R], arguments: Iterable[T]) -> list[R]:
-    """Results of a function for several arguments; raises one `InputError` with the problems of all of them."""
+    """Results of a function for several arguments; raises `InputErrors` with the problems of all of them."""
     results: list[R] = []
     errors: list[InputError] = []
     for argument in arguments:
@@ -79,9 +109,7 @@ def apply_all(function: Callable[[T], R], arguments: Iterable[T]) -> list[R]:
         except InputError as error:
             errors.append(error)
     if errors:
-        all_of_them = InputError(errors[0].source, [problem for error in errors for problem in error.problems])
-        all_of_them.args = ("\n".join(dict.fromkeys(map(str, errors))),)  # each with its own source
-        raise all_of_them from errors[0]
+        raise InputErrors(errors) from errors[0]
     return results
 
 

@@ -5,6 +5,7 @@ A function that needs an extra calls `require` before it computes or writes anyt
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.util import find_spec
 
 from walkers.errors import InputError, Problem
@@ -27,7 +28,13 @@ class ExtraMissing(InputError):
     def __init__(self, extra: str, missing: list[str]) -> None:
         how = f"make extras, or pip install 'granular-walkers[{extra}]'"
         super().__init__(EXTRAS[extra][0], [Problem("", None, f"needs {', '.join(missing)}: {how}")])
-        self.args = (f"{self.source} {self.problems[0]}",)
+
+    def __str__(self) -> str:
+        return f"{self.source} {self.problems[0]}"
+
+    def renamed(self, name_of: Callable[[str], str]) -> ExtraMissing:  # noqa: ARG002
+        """The error itself: its source is no argument."""
+        return self
 
 
 def require(extra: str) -> None:

@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from walkers.commands import commands
+from walkers.commands import ALL_COMMANDS
 from walkers.errors import InputError, WalkersError, shortened
 from walkers.text import printable
 
@@ -94,7 +94,7 @@ def _status(tokens: list[str]) -> int:
 def print_help() -> None:
     """Print the commands and options of the program. Without cyclopts and rich this takes a tenth of the time."""
     print(f"Usage: walkers COMMAND [OPTIONS]\n\n{_SUMMARY}")
-    for heading, group in groupby(commands(), lambda command: command.heading):
+    for heading, group in groupby(ALL_COMMANDS, lambda command: command.heading):
         _print_panel(heading, {command.name: command.summary for command in group})
     _print_panel("Options", _OPTIONS)
 
@@ -140,7 +140,7 @@ def program() -> App:
     look: dict[str, Any] = {"help_formatter": _PlainHelp(), "help_format": "plaintext", "group_parameters": "Options"}
     usual: dict[str, Any] = {"default_parameter": Parameter(negative=()), "result_action": "return_value"}
     app = App("walkers", _SUMMARY, version_flags=(), **usual, **quiet, **look)
-    for command in commands():
+    for command in ALL_COMMANDS:
         app.command(command.place, name=command.name, help=command.summary)
     app.command(print_version, name="--version")
     app.register_install_completion_command(help=_OPTIONS["--install-completion"])
@@ -173,8 +173,8 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
 
     if isinstance(stop, SystemExit):
         return stop.code if isinstance(stop.code, int) else 0
-    if isinstance(stop, InputError) and stop.source not in tokens:
-        stop.args = (str(stop).replace(stop.source, _options_of(stop.source, tokens), 1),)
+    if isinstance(stop, InputError):
+        stop = stop.renamed(lambda source: source if source in tokens else _options_of(source, tokens))
     if isinstance(stop, _Terminated):
         return _tell(str(stop), stop.status)
     statuses = {InputError: 2, WalkersError: 1, KeyboardInterrupt: _INTERRUPTED}
