@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import json
 import os
+import pkgutil
 import re
 import shutil
 import subprocess
@@ -20,6 +22,7 @@ from typing import Any
 
 import grimp
 import pytest
+from cyclopts import App
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
@@ -29,6 +32,7 @@ from tests.tools.plant_faults import problems_of
 from walkers import load_case
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
+from walkers.commands import ALL_COMMANDS, Command
 from walkers.errors import InputError
 from walkers.extras import EXTRAS, ExtraMissing, module_of
 from walkers.inputs.reading import shipped
@@ -256,6 +260,26 @@ def test_a_new_case_runs_and_its_lines_that_are_commented_out_say_what_holds_wit
 
 def settings(changes: Mapping[str, object]) -> list[str]:
     return [word for key, value in changes.items() for word in ("--set", f"{key}={value}")]
+
+
+@pytest.mark.parametrize("command", ALL_COMMANDS, ids=lambda command: command.name)
+def test_the_table_of_commands_says_what_they_do(command: Command) -> None:
+    function = pkgutil.resolve_name(command.place)
+    if isinstance(function, App):  # with commands of its own, which have docstrings
+        assert list(function), command.name
+    else:
+        assert function.__doc__.splitlines()[0] == command.summary
+
+
+def test_every_public_function_of_the_modules_of_commands_is_a_command() -> None:
+    places = {command.place for command in ALL_COMMANDS}
+    for module in {place.partition(":")[0] for place in places}:
+        functions = inspect.getmembers(importlib.import_module(module), inspect.isfunction)
+        own = {f"{module}:{name}" for name, function in functions if function.__module__ == module and name[0] != "_"}
+        apps = inspect.getmembers(importlib.import_module(module), lambda value: isinstance(value, App))
+        of_apps = {f"{module}:{name}" for _, app in apps for name in map(str, app) if name[0] != "-"}
+        of_apps |= {f"{module}:{app.default_command.__name__}" for _, app in apps if app.default_command}
+        assert own - of_apps <= places
 
 
 def test_help_names_every_command() -> None:

@@ -20,7 +20,7 @@ from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
 
 from docs.tables import markdown
-from walkers.commands import commands
+from walkers.commands import ALL_COMMANDS
 from walkers.commands.catalogue import COMMANDS, NOT_KNOWN, catalogue
 from walkers.inputs.config_table import Table, example_of, keys_in, table_in
 from walkers.inputs.resolving.library import LibraryNumber
@@ -213,7 +213,7 @@ of commands, options, cases, sweeps and runs for bash, zsh and fish; call it aga
 def _commands() -> str:
     text, app = _COMMANDS, program()
     names: list[list[str]] = [[]]
-    for name in (command.name for command in commands()):
+    for name in (command.name for command in ALL_COMMANDS):
         names += [[name], *([name, part] for part in app[name] if part[0] != "-")]
     for words in names:
         head, page = " ".join(["walkers", *words]), io.StringIO()
