@@ -94,11 +94,11 @@ def _read_apart(path: Path) -> tuple[Any, Any]:
         arrays = np.load(BytesIO(done.stdout))
         return arrays["points"], arrays["triangles"]
     complaint = _said_by_reader(done.stderr.decode("utf-8", "replace"))
+    reason = done.stdout.decode("utf-8", "replace")
     if done.returncode == mesh_reader.REFUSED:
-        reason = done.stdout.decode("utf-8", "replace")
-        if complaint and (reason.isdigit() or reason.startswith("it has ")):
-            reason = complaint  # the exit status of meshio, or nothing that VTK has found
         raise _unreadable(reason)
+    if done.returncode == mesh_reader.READ_NOTHING:
+        raise _unreadable(complaint or reason)
     if done.returncode < 0:
         raise _unreadable(complaint or f"the reader was ended by signal {-done.returncode}, as by a damaged file")
     raise _unreadable(complaint or f"the reader ended with status {done.returncode}")

@@ -1,9 +1,10 @@
 """Read one mesh file in a process of its own: ``python -m walkers.inputs.meshes.mesh_reader FILE``.
 
 Libraries that read meshes end the process, or ask for all memory, where a file is damaged or made to
-do harm. So `walkers.inputs.meshes.mesh_file` starts this module with limits of time and memory. The module writes
-the points and triangles to standard output as an npz file, or the reason why there are none as text,
-with exit status `REFUSED`. It imports nothing of this project, so that it starts quickly.
+do harm. So `walkers.inputs.meshes.mesh_file` starts this module with limits of time and memory. The
+module writes the points and triangles to standard output as an npz file, or the reason why there are
+none as text, with exit status `REFUSED` or `READ_NOTHING`. Of this project it imports the types of
+arrays alone, so that it starts quickly.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ Polygons = list[npt.NDArray[np.int64]]
 
 REFUSED = 3
 """Exit status where the file is no mesh that can be read."""
+READ_NOTHING = 4
+"""Exit status where a reader gives no surface: what it has printed says more than the text of this module."""
 MOST_BYTES = 3 << 30
 """Address space that reading may take, bytes."""
 MOST_SECONDS = 60
@@ -56,6 +59,10 @@ _VTK_POLYGON = 7
 _CORNERS_OF_MESHIO_CELLS = {"triangle": 3, "quad": 4}
 
 
+class NothingRead(ValueError):
+    """A reader gives no surface; it may have printed why."""
+
+
 def _numpy_support() -> Any:
     """VTK's functions for arrays of numpy, which have no types."""
     return import_module("vtkmodules.util.numpy_support")
@@ -67,7 +74,7 @@ def _points_of(dataset: Any) -> FloatArray:
 
     points = dataset.GetPoints()
     if points is None or points.GetNumberOfPoints() == 0:
-        raise ValueError("it has no points")
+        raise NothingRead("it has no points")
     return shortest_decimals(vtk_to_numpy(points.GetData()))
 
 
@@ -183,7 +190,7 @@ def _read_by_vtk(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     reader.Update()
     dataset = reader.GetOutput()
     if dataset is None:
-        raise ValueError("it has no surface")
+        raise NothingRead("it has no surface")
     if dataset.IsA("vtkPolyData"):
         points = _points_of(dataset)
         _check_precision(path, points)
@@ -191,7 +198,7 @@ def _read_by_vtk(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     if dataset.IsA("vtkUnstructuredGrid"):
         points = _points_of(dataset)
         return points, _triangles_of_polygons(points, _polygons_of_grid(dataset))
-    raise ValueError(f"it has a {dataset.GetClassName()[3:]}, which is no surface")
+    raise NothingRead(f"it has a {dataset.GetClassName()[3:]}, which is no surface")
 
 
 def _lines_of_off(path: Path) -> list[list[str]]:
@@ -307,7 +314,7 @@ def main(arguments: Sequence[str]) -> int:
         return REFUSED
     except (Exception, SystemExit) as error:  # meshio ends the process where a file is not of its format
         sys.stdout.write(str(error))
-        return REFUSED
+        return READ_NOTHING if isinstance(error, (NothingRead, SystemExit)) else REFUSED
     arrays = BytesIO()
     np.savez(arrays, points=points, triangles=triangles)
     sys.stdout.buffer.write(arrays.getvalue())
