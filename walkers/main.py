@@ -11,6 +11,7 @@ import textwrap
 import warnings
 from collections.abc import Mapping
 from contextlib import suppress
+from datetime import UTC, datetime
 from itertools import groupby
 from tempfile import TemporaryDirectory
 from types import FrameType
@@ -200,9 +201,18 @@ def _message_of_system(stop: BaseException) -> str:
     """Message about a path that cannot be read or written, or about an impossible clock; empty for other errors."""
     if isinstance(stop, OSError):
         return f"{stop.filename}: {stop.strerror}" if stop.filename else str(stop)
-    if isinstance(stop, OverflowError) and "timestamp" in str(stop):
+    if isinstance(stop, OverflowError) and _clock_is_wrong():
         return f"the clock of this machine is wrong ({stop})"
     return ""
+
+
+def _clock_is_wrong() -> bool:
+    """Whether the time of this machine is no date, as after the failure of its battery."""
+    try:
+        datetime.now(UTC)
+    except (OverflowError, ValueError, OSError):
+        return True
+    return False
 
 
 def _options_of(names: str, tokens: list[str]) -> str:

@@ -15,10 +15,21 @@ _LONGEST_SILENCE_SECONDS = 60.0
 
 
 class Progress(NamedTuple):
-    """Completed share of a run, a sweep or a film, and what is done as text."""
+    """Progress of a run, a sweep or a film.
+
+    Attributes
+    ----------
+    share
+        The completed share, from 0 to 1.
+    text
+        What is done.
+    stage
+        The same in one or two words, of a run: its share in per cent, ``starting`` or ``coming to rest``.
+    """
 
     share: float
     text: str
+    stage: str = ""
 
 
 Tell = Callable[[Progress], None]

@@ -124,7 +124,8 @@ def progress_at(place: Path, case: Case | None = None) -> Progress | None:
     try:
         if shared.is_dir():
             share = last_step(shared / decks.OUTPUT_NAME) / on_disk.layout_of(shared).steps
-            return Progress(share, f"{100 * share:.0f} %")
+            percent = f"{100 * share:.0f} %"
+            return Progress(share, percent, percent)
         case = case or on_disk.case_of(directory)
         done = [_read_segment(path) for path in on_disk.segment_directories(directory)]
         (folder,) = (directory / on_disk.SEGMENTS).glob("*.new")
@@ -178,9 +179,11 @@ def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: flo
     share, simulated = done / steps, (before + step) * run.time_step
     text = "coming to rest" if start is None else f"{100 * share:.0f} %"
     if not rate:
-        return Progress(share, text if step > segment.begin else "starting")
+        stage = text if step > segment.begin else "starting"
+        return Progress(share, stage, stage)
     left = f"{'at most ' if run.until_steady or run.until else ''}{duration_text((steps - done) / rate)} left"
-    return Progress(share, f"{text}, {left}, {simulated:.3f} s simulated, {rate:.0f} steps/s")
+    details = f"{text}, {left}, {simulated:.3f} s simulated, {rate:.0f} steps/s"
+    return Progress(share, details, text)
 
 
 def _are_constant(directory: Path) -> bool:
