@@ -5,8 +5,8 @@ from __future__ import annotations
 import shlex
 import warnings
 from base64 import b64encode
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -14,12 +14,11 @@ from inspect import signature
 from mimetypes import guess_type
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal
 
-from walkers import DEFAULT_OUT, RECORDS
-from walkers.errors import InputError, Problem, WalkersError, apply_all, check_utf8, expected_of, refused
+from walkers import DEFAULT_OUT
+from walkers.errors import InputError, Problem, apply_all, check_utf8, expected_of, refused
 from walkers.files import read_json
-from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.measure import results
 from walkers.postprocess.measure.motion import Motion, read_motion
@@ -35,11 +34,11 @@ from walkers.postprocess.show.series import render_series
 from walkers.progress import Progress, in_notebook, progress_of
 from walkers.runner import directory as on_disk
 from walkers.runner.binary import find_engine
-from walkers.runner.failures import EngineMissing, RunBusy
-from walkers.runner.manifest import read_manifest
+from walkers.runner.failures import RunBusy
 from walkers.runs.by_hand import as_run, take_in
 from walkers.runs.comparison import Comparison, Side, compare_runs
 from walkers.runs.making import check_audit, make_runs, progress_at
+from walkers.runs.names import Changes, Given, Reference, find, is_begun, not_a_run, readable_case, refusing
 from walkers.runs.status import state_at, worst_status
 from walkers.sweeps import table as of_points
 from walkers.sweeps.accuracy import measure_accuracy
@@ -64,8 +63,6 @@ if TYPE_CHECKING:
     from walkers.inputs.origins import Origin
     from walkers.inputs.tables.case import Case
 
-Named: TypeAlias = "Case | str | Path | Mapping[str, Any]"
-Changes: TypeAlias = "Mapping[str, Any] | None"
 Export = Literal["deck", "vtk", "lammps", "archive"]
 EXPORTS = {
     "deck": "walkers.runs.by_hand:write_folder",
@@ -74,79 +71,12 @@ EXPORTS = {
     "archive": "walkers.archive.writing:write_archive",
 }
 """Functions that write the forms of exports."""
-NOT_A_RUN = {
-    "folder": "not a finished run: expected a folder with a manifest.json",
-    "deck": "is a deck that was run by hand; first do: walkers run {}",
-    "calibration": "a calibration's outcome: its report is calibration.md",
-    "sweep": "is a sweep: expected one of its runs; walkers list, plot and report take sweeps",
-    "archive": "an archive: unpack it and give a run or a sweep in it",
-}
 
 
 # --- names ------------------------------------------------------------------------------------------------------------
 
 
-def find(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[str, Path]:
-    """Kind (of `RECORDS`, ``archive``, ``deck``, ``folder``, ``case``) and path of what a name means; see `load`.
-
-    Only names are read. With changes it is a case. A folder does not hide a shipped case of the same name. The file of
-    a sweep means the sweep if it was run. The path of an unfinished run is its final directory.
-    """
-    if isinstance(reference, (str, Path)) and not changes:
-        with suppress(OSError):  # a name that no file system accepts
-            return next(_meanings(Path(reference), Path(out)))
-    return "case", Path(out)
-
-
-def _meanings(path: Path, out: Path) -> Iterator[tuple[str, Path]]:
-    is_shipped = str(path) in shipped("case")
-    for place in (path, out / path):
-        yield from ((kind, place) for kind, file in RECORDS.items() if (place / file).is_file())
-        bare = place.parent / place.name.removesuffix(on_disk.UNFINISHED)
-        if on_disk.is_run_name(bare.name) and _is_begun(bare):
-            yield "run", bare
-        if on_disk.is_deck_folder(place) and not is_shipped:
-            yield "deck", place
-    if (out / path.stem / RECORDS["sweep"]).is_file() and is_sweep_file(path):
-        yield "sweep", out / path.stem
-    if path.suffix == ".zip" and path.is_file():
-        yield "archive", path
-    yield "folder" if path.is_dir() and not is_shipped else "case", path
-
-
-def _is_begun(place: Path) -> bool:
-    """Whether a place belongs to a running or interrupted run."""
-    return (on_disk.unfinished(place) / on_disk.CASE_NAME).is_file() or on_disk.is_locked(place)
-
-
-def case_at(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[Case, Path]:
-    """The case that a user names, or the case of a run, and the folder in which its run belongs; see `load`."""
-    out = Path(out)
-    if not isinstance(reference, (str, Path, Mapping)):
-        return reference.changed(changes or {}), out
-    kind, path = find(reference, out)
-    if kind == "run":
-        return Run(path).check().case.changed(changes or {}), path.parent
-    if kind in ("sweep", "calibration"):
-        find_input(str(reference) if is_sweep_file(Path(str(reference))) else path, "case")
-    if kind not in ("case", "archive"):
-        raise refused(reference, "is a folder without a run" if kind == "folder" else NOT_A_RUN[kind].format(reference))
-    return load_case(reference, changes), out
-
-
-def case_and_run(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> tuple[Case, Path | None]:
-    """The case that a user names, and the directory of its finished run, if there is one; see `load`."""
-    case, folder = case_at(reference, out, changes)
-    kind, place = find(reference, out, changes)
-    if kind != "run":
-        try:
-            place = on_disk.run_place(case, find_engine(), folder)
-        except EngineMissing:
-            return case, None
-    return case, place if on_disk.is_finished(place) else None
-
-
-def load(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Run | Sweep:
+def load(reference: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Run | Sweep:
     """Find a sweep, or a run, finished or not.
 
     `InputError` if it does not exist or cannot be read; `EngineFailure` if a case is given and no engine is installed.
@@ -164,29 +94,36 @@ def load(reference: Named, out: str | Path = DEFAULT_OUT, changes: Changes = Non
     >>> walkers.run("fig1b", tmp).directory == walkers.load("fig1b", tmp).directory
     True
     """
-    kind, path = find(reference, out, changes)
-    if kind == "sweep":
-        return Sweep(path)
-    if kind == "run":
-        run = Run(path)
-    elif kind == "case":
-        case, folder = case_at(reference, out, changes)
-        run = Run(on_disk.run_place(case, find_engine(), folder), requested=case)
-        if not (on_disk.is_finished(run.directory) or _is_begun(run.directory)):
-            settings = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in (changes or {}).items()]
-            name = str(reference) if isinstance(reference, (str, Path)) else case.name
-            raise refused(name, f"no finished run in {folder}; first do: walkers run {' '.join([name, *settings])}")
+    named = find(reference, out, changes)
+    if named.means_case:
+        run = _run_of_case(named)
+    elif named.kind == "sweep":
+        return Sweep(named.path)
+    elif named.kind == "run":
+        run = Run(named.path)
     else:
-        raise refused(reference, NOT_A_RUN[kind].format(reference))
+        raise not_a_run(named.given, named.kind)
     if on_disk.is_finished(run.check().directory):
         _ = run.result  # refuses a result that cannot be read
     return run
 
 
+def _run_of_case(named: Reference) -> Run:
+    """The run of a case, finished or begun; `InputError` if there is none."""
+    case = named.case
+    place = on_disk.run_place(case, find_engine(), named.folder)
+    if on_disk.is_finished(place) or is_begun(place):
+        return Run(place, requested=case)
+    name = str(named.given) if isinstance(named.given, (str, Path)) else case.name
+    settings = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in named.changes.items()]
+    command = " ".join(["walkers run", name, *settings])
+    raise refused(name, f"no finished run in {named.folder}; first do: {command}")
+
+
 def directory_of(reference: str | Path, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Path:
     """The directory that a user names, whatever it contains; for a case, the directory of its run."""
-    kind, path = find(reference, out, changes)
-    return load(reference, out, changes).directory if kind == "case" else path
+    named = find(reference, out, changes)
+    return load(named).directory if named.means_case else named.path
 
 
 # --- runs -------------------------------------------------------------------------------------------------------------
@@ -229,13 +166,7 @@ class Run:
 
     def check(self) -> Run:
         """The run itself; `InputError` if a file that describes it cannot be read."""
-        done = on_disk.is_finished(self.directory)
-        with _refusing(self.directory, "the run's manifest.json"):
-            _ = done and read_manifest(self.directory)
-        with _refusing(self.directory, "the run's case.json"):
-            _ = self.case
-        with _refusing(self.directory, "the run's layout.json"):
-            _ = done and on_disk.layout_of(on_disk.segment_directories(self.directory)[0])
+        readable_case(self.directory)
         return self
 
     @property
@@ -401,15 +332,6 @@ def writer_of(form: str, options: Iterable[str] = ()) -> Callable[..., Path]:
     return write
 
 
-@contextmanager
-def _refusing(directory: Path, contents: str) -> Iterator[None]:
-    """Turn the errors of a damaged file into one `InputError`."""
-    try:
-        yield
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, WalkersError) as error:
-        raise refused(directory, f"{contents} cannot be read ({error})") from error
-
-
 def _path(to: str | Path | None) -> Path | None:
     return None if to is None else Path(to)
 
@@ -453,9 +375,10 @@ def run(
     >>> one.walkers[["facing", "steady"]].drop_duplicates("facing").to_dict("list")
     {'facing': [1, -1], 'steady': [True, True]}
     """
-    if not force and (finished := finished_at(case, out)):
+    named = find(case, out)
+    if not force and (finished := finished_at(named)):
         return finished
-    case, out = case_at(case, out)
+    case, out = named.case, named.folder
     for text in (out.absolute(), case.name):
         check_utf8(text)
     binary = find_engine(engine)
@@ -470,20 +393,19 @@ def run(
     return Run(place, cached=not runs[place.name], requested=case)
 
 
-def finished_at(reference: Named, out: str | Path) -> Run | None:
+def finished_at(named: Reference) -> Run | None:
     """The finished run with a name or a directory, also of a deck that was run by hand; None for a case."""
-    kind, path = find(reference, out)
-    if kind not in ("run", "deck"):
+    if named.means_case or named.kind not in ("run", "deck"):
         return None
-    if on_disk.is_deck_folder(path):
-        take_in(path)
-    return _measured(Run(path)) if on_disk.is_finished(path) else None
+    if on_disk.is_deck_folder(named.path):
+        take_in(named.path)
+    return _measured(Run(named.path)) if on_disk.is_finished(named.path) else None
 
 
 def _measured(run: Run) -> Run:
     """The run; a finished run is measured again if its result or a table cannot be read."""
     if on_disk.is_finished(run.check().directory):
-        with _refusing(run.directory, "the run"):
+        with refusing(run.directory, "the run"):
             results.ensure_measured(run.directory)
     return run
 
@@ -651,9 +573,13 @@ def compare(
         raise refused(first, "expected a second run, or changed values (--set KEY=VALUE)")
 
     def side(name: str | Path, changes: Changes) -> Side:
-        case, directory = case_and_run(name, out, changes)
-        label = directory.name if directory and not changes and find(name, out)[0] == "run" else str(name)
-        return Side(" ".join([label, *(f"{key}={value}" for key, value in (changes or {}).items())]), case, directory)
+        named = find(name, out, changes)
+        case = named.case
+        directory = named.finished_run
+        is_run = named.kind == "run" and not named.means_case
+        words = [directory.name if directory and is_run else str(name)]
+        words += [f"{key}={value}" for key, value in named.changes.items()]
+        return Side(" ".join(words), case, directory)
 
     named = ((first, None), (first if second is None else second, changes))
     return compare_runs(*apply_all(lambda of: side(*of), named))
@@ -719,18 +645,21 @@ def calibrate(
     return calibrate.calibrate(load_calibration(calibration), Path(out), Options(jobs), progress=progress, **how)
 
 
-def predict(case: Named, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> dict[str, Any]:
+def predict(case: Given, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> dict[str, Any]:
     """The prediction of the theory for a case, SI units, under ``engine`` with the result of its run if there is one.
 
     See `walkers.theory.prediction.predict`.
     """
     from walkers.theory import prediction
 
-    named, directory = case_and_run(case, out, changes)
+    named = find(case, out, changes)
     try:
-        predicted = {**prediction.predict(named), "outside": prediction.outside_of_the_paper(named), "engine": None}
+        predicted = prediction.predict(named.case)
     except prediction.NotApplicable as error:
-        raise InputError(named.name, [Problem(error.key, None, error.reason)]) from error
-    with suppress(InputError):  # a result that cannot be read
-        predicted["engine"] = directory and Run(directory, requested=named).result.as_dict()
+        raise InputError(named.case.name, [Problem(error.key, None, error.reason)]) from error
+    predicted["outside"] = prediction.outside_of_the_paper(named.case)
+    predicted["engine"] = None
+    if named.finished_run:
+        with suppress(InputError):  # a result that cannot be read
+            predicted["engine"] = Run(named.finished_run, requested=named.case).result.as_dict()
     return predicted

@@ -117,11 +117,11 @@ def case(
     seeds
         Piles: number of random starts.
     """
-    from walkers.api import case_at
+    from walkers.runs.names import find
     from walkers.second_engine.crosscheck import crosscheck, shortened
     from walkers.second_engine.engine import TERMS
 
-    loaded = case_at(case, at.out, at.values)[0]
+    loaded = find(case, at.out, at.values).case
     refuse("--seeds", seeds > 1 and loaded.mixture is None, "is for piles: walkers and placed beads have one start")
     for term in without or ():
         refuse(f"--without {term}", term not in TERMS, f"expected one of {', '.join(TERMS)}")

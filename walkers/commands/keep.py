@@ -11,11 +11,12 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from walkers import DEFAULT_OUT
-from walkers.api import Export, case_and_run, directory_of, writer_of
+from walkers.api import Export, directory_of, writer_of
 from walkers.commands.options import At, Out, RunOrSweep, refuse, tell
 from walkers.errors import apply_all
 from walkers.runner.directory import UNFINISHED
 from walkers.runs.by_hand import as_run, write_folder
+from walkers.runs.names import find
 from walkers.sweeps import folder
 from walkers.templates.deck import RUN_NAME, render_deck, whole
 
@@ -81,7 +82,8 @@ def export(
         print(at.load(name).export(form, to, **given))
         return
     writer_of(form, given)
-    case = as_run(*case_and_run(name, at.out, at.values))
+    named = find(name, at.out, at.values)
+    case = as_run(named.case, named.finished_run)
     if to is None:
         print(render_deck(case, whole(case)).text, end="")
     else:

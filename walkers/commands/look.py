@@ -53,14 +53,16 @@ def list_(
 
 
 def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
-    from walkers.api import Sweep, find
+    from walkers.api import Sweep
+    from walkers.runs.names import find
     from walkers.sweeps import table
 
-    kind, place = find(name, out)
+    named = find(name, out)
+    kind = named.kind
     refuse(name, kind == "run", f"is a run: walkers run {name} prints its result")
     refuse(name, kind == "case", f"no sweep in {out}; walkers list shows what is there")
     refuse(name, kind != "sweep", f"not a sweep: expected a folder with a sweep.json (walkers list --out {name}?)")
-    found_sweep = Sweep(place)
+    found_sweep = Sweep(named.path)
     if to is not None:
         table.write_table_file(found_sweep.table(), to)
         print(to)

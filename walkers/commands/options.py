@@ -79,11 +79,12 @@ class At:
 
     def run(self, name: str) -> FoundRun:
         """The named run."""
-        from walkers.api import NOT_A_RUN, Run
+        from walkers.api import Run
+        from walkers.runs.names import not_a_run
 
         loaded = self.load(name)
         if not isinstance(loaded, Run):
-            raise refused(name, NOT_A_RUN["sweep"])
+            raise not_a_run(name, "sweep")
         return loaded
 
 

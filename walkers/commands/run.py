@@ -55,10 +55,10 @@ def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = 
         predicted = walkers.predict(case, at.out, at.values)
         print_as(as_json, lambda: predicted, lambda: describe_prediction(predicted, predicted["engine"]))
         return
-    from walkers.api import case_at
+    from walkers.runs.names import find
     from walkers.runs.preview import describe, summarise
 
-    summary = summarise(case_at(case, at.out, at.values)[0])
+    summary = summarise(find(case, at.out, at.values).case)
     print_as(as_json, lambda: summary, lambda: describe(summary))
 
 
@@ -96,8 +96,9 @@ def run(
     accuracy
         Also run with smaller time steps and harder beads, and print the numerical error of the result.
     """
-    from walkers.api import case_at, finished_at
+    from walkers.api import finished_at
     from walkers.runner.failures import EngineFailure
+    from walkers.runs.names import find
     from walkers.runs.preview import notes
     from walkers.sweeps.accuracy import times_of
     from walkers.sweeps.spread import describe, spread_sweep
@@ -105,13 +106,17 @@ def run(
     refuse("CASE", not cases, "expected a case, such as fig1b")
     draws = _draws(spread, points)
     # Report a mistake in the last file before the first run starts.
-    finished = apply_all(lambda case: None if at.changes or force else finished_at(case, at.out), cases)
-    loaded = apply_all(lambda case: case_at(case, at.out, at.values), cases)
-    apply_all(times_of, [case for case, _ in loaded if accuracy])
-    for case, _ in loaded if spread else ():  # also an unusable range
-        list(spread_sweep(case, draws, by.engine).cases())
+    named = [find(case, at.out, at.values) for case in cases]
+    finished = [None for _ in named] if force else apply_all(finished_at, named)
+    loaded = apply_all(lambda reference: reference.case, named)
+    if accuracy:
+        apply_all(times_of, loaded)
+    if spread:
+        for case in loaded:
+            list(spread_sweep(case, draws, by.engine).cases())  # also an unusable range
     failed = False
-    for (case, folder), earlier in zip(loaded, finished, strict=True):
+    for reference, case, earlier in zip(named, loaded, finished, strict=True):
+        folder = reference.folder
         tell(*(f"{case.name}: {note}" for note in notes(case) if earlier is None))
         try:
             done = earlier or walkers.run(case, folder, force=force, progress=True, time_limit=limit, **vars(by))

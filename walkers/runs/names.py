@@ -1,0 +1,199 @@
+"""What a user means by a name: a run, a sweep, a calibration, an archive, a deck or a case.
+
+A name is looked up once, by `find`. The `Reference` that it gives knows its case and its run, and is handed on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from walkers import DEFAULT_OUT, RECORDS
+from walkers.errors import InputError, WalkersError, refused
+from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
+from walkers.inputs.tables.case import Case
+from walkers.runner import directory as on_disk
+from walkers.runner.binary import find_engine
+from walkers.runner.failures import EngineMissing
+from walkers.runner.manifest import read_manifest
+
+Kind = Literal["run", "sweep", "calibration", "archive", "deck", "folder", "case"]
+Given: TypeAlias = "Case | str | Path | Mapping[str, Any]"
+"""What may stand for a case: a resolved case, its file or name, or its tables."""
+Changes: TypeAlias = "Mapping[str, Any] | None"
+"""Other values of a case, by dotted keys."""
+
+_NOT_A_RUN: Mapping[Kind, str] = {
+    "folder": "not a finished run: expected a folder with a manifest.json",
+    "deck": "is a deck that was run by hand; first do: walkers run {name}",
+    "calibration": "a calibration's outcome: its report is calibration.md",
+    "sweep": "is a sweep: expected one of its runs; walkers list, plot and report take sweeps",
+    "archive": "an archive: unpack it and give a run or a sweep in it",
+}
+
+
+def not_a_run(name: object, kind: Kind) -> InputError:
+    """An error that says what a name means, where a run was expected."""
+    return refused(name, _NOT_A_RUN[kind].format(name=name))
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a user means by a name.
+
+    Attributes
+    ----------
+    given
+        The name, the path, or the case itself.
+    kind
+        What it is, without the changes: changed, a run is another case.
+    path
+        Where it is. The path of an unfinished run is its final directory; of a case without a file, the name.
+    out
+        Folder of the run directories.
+    changes
+        Other values of the case, by dotted keys.
+    """
+
+    given: Given
+    kind: Kind
+    path: Path
+    out: Path
+    changes: Mapping[str, Any]
+
+    @property
+    def means_case(self) -> bool:
+        """Whether it is a case, or something else whose case is changed."""
+        return self.kind == "case" or bool(self.changes)
+
+    @property
+    def folder(self) -> Path:
+        """The folder in which the run of the case belongs."""
+        return self.path.parent if self.kind == "run" else self.out
+
+    @cached_property
+    def case(self) -> Case:
+        """The case, with the changes.
+
+        Raises
+        ------
+        InputError
+            If it has no single case, or the case cannot be read.
+        """
+        given = self.given
+        if isinstance(given, Case):
+            return given.changed(self.changes)
+        if isinstance(given, Mapping):
+            return load_case(given, self.changes)
+        if self.kind == "run":
+            return readable_case(self.path).changed(self.changes)
+        if self.kind in ("sweep", "calibration"):
+            # A file of a sweep or a calibration is refused with what it is, a directory as not being a case.
+            find_input(str(given) if is_sweep_file(Path(given)) else self.path, "case")
+            raise not_a_run(given, self.kind)
+        if self.kind == "folder":
+            raise refused(given, "is a folder without a run")
+        if self.kind == "deck":
+            raise not_a_run(given, self.kind)
+        return load_case(given, self.changes)
+
+    @cached_property
+    def finished_run(self) -> Path | None:
+        """The directory of the finished run of the case; None if there is none."""
+        if self.kind == "run" and not self.changes:
+            place = self.path
+        else:
+            try:
+                place = on_disk.run_place(self.case, find_engine(), self.folder)
+            except EngineMissing:
+                return None
+        return place if on_disk.is_finished(place) else None
+
+
+def find(given: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Reference:
+    """Find what a user means by a name; nothing is read but names of files.
+
+    A folder does not hide a shipped case of the same name. The file of a sweep means the sweep if it was run.
+
+    Parameters
+    ----------
+    given
+        The directory of a run or a sweep, its name in the folder ``out``, an archive, a deck that was run by hand, or a
+        case (resolved, tables, file or shipped name). A reference is returned as it is.
+    out
+        Folder of the run directories.
+    changes
+        Other values of the case, by dotted keys.
+    """
+    if isinstance(given, Reference):
+        return given
+    kind: Kind = "case"
+    path = Path(out)
+    if isinstance(given, (str, Path)):
+        path = Path(given)
+        with suppress(OSError):  # a name that no file system accepts
+            kind, path = next(_meanings(path, Path(out)))
+    return Reference(given, kind, path, Path(out), changes or {})
+
+
+def _meanings(path: Path, out: Path) -> Iterator[tuple[Kind, Path]]:
+    """What a path may mean, and where that is, the most likely first."""
+    is_shipped = str(path) in shipped("case")
+    kinds: tuple[Kind, ...] = ("run", "sweep", "calibration")
+    for place in (path, out / path):
+        for kind in kinds:
+            if (place / RECORDS[kind]).is_file():
+                yield kind, place
+        complete = place.parent / place.name.removesuffix(on_disk.UNFINISHED)
+        if on_disk.is_run_name(complete.name) and is_begun(complete):
+            yield "run", complete
+        if on_disk.is_deck_folder(place) and not is_shipped:
+            yield "deck", place
+    if (out / path.stem / RECORDS["sweep"]).is_file() and is_sweep_file(path):
+        yield "sweep", out / path.stem
+    if path.suffix == ".zip" and path.is_file():
+        yield "archive", path
+    yield "folder" if path.is_dir() and not is_shipped else "case", path
+
+
+def is_begun(place: Path) -> bool:
+    """Whether a place belongs to a running or interrupted run."""
+    return (on_disk.unfinished(place) / on_disk.CASE_NAME).is_file() or on_disk.is_locked(place)
+
+
+def readable_case(directory: Path) -> Case:
+    """The case of a run, finished or not, whose files can be read.
+
+    Parameters
+    ----------
+    directory
+        The final directory of the run.
+
+    Raises
+    ------
+    InputError
+        If a file that describes the run cannot be read.
+    """
+    is_finished = on_disk.is_finished(directory)
+    if is_finished:
+        with refusing(directory, "the run's manifest.json"):
+            read_manifest(directory)
+    with refusing(directory, "the run's case.json"):
+        case = on_disk.case_of(directory if is_finished else on_disk.unfinished(directory))
+    if is_finished:
+        with refusing(directory, "the run's layout.json"):
+            on_disk.layout_of(on_disk.segment_directories(directory)[0])
+    return case
+
+
+@contextmanager
+def refusing(directory: Path, contents: str) -> Iterator[None]:
+    """Turn the errors of a damaged file into one `InputError`."""
+    try:
+        yield
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, WalkersError) as error:
+        raise refused(directory, f"{contents} cannot be read ({error})") from error
