@@ -249,7 +249,6 @@ def test_a_contact_model_that_may_not_be_the_compiled_is_compiled_anew(
         pytest.skip("only root can give files away")
     (sources := tmp_path / "engine").mkdir()
     shutil.copy(binary.SOURCES / "bridge.map", sources)
-    (sources / "table.h").touch()
     (sources / "bridge.cpp").write_text("// FORCES_VERSION 1\nint small = 1;\n")
     monkeypatch.setattr(binary, "SOURCES", sources)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

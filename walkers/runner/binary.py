@@ -38,8 +38,8 @@ from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME
 
 ENGINE_VARIABLE = "WALKERS_ENGINE"
 SOURCES = Path(str(files("walkers.templates.engine")))
-_MODEL = ("bridge.cpp", "table.h")
-"""Source files of the contact model."""
+_MODEL = "bridge.cpp"
+"""The file of the contact model that is compiled; it includes the headers beside it."""
 _FORCES_VERSION = re.compile(rb"^// FORCES_VERSION \d+$", re.MULTILINE)
 """The line of ``bridge.cpp`` that is part of the names of runs and audits; the rest of the sources is not."""
 _PACKAGES = "g++ libliggghts-dev libopenmpi-dev"
@@ -75,7 +75,7 @@ def find_engine(name_or_path: str | None = None) -> Engine:
     for part in _parts_of(path, path.stat().st_mtime_ns):
         about = part.stat()
         digest.update(bytes.fromhex(_sha256(part, about.st_mtime_ns, about.st_size)))
-    digest.update(b"".join(_FORCES_VERSION.findall((SOURCES / "bridge.cpp").read_bytes())))
+    digest.update(b"".join(_FORCES_VERSION.findall((SOURCES / _MODEL).read_bytes())))
     return Engine(path, digest.hexdigest())
 
 
@@ -125,10 +125,15 @@ def model_sources() -> list[Path]:
     return sorted(path for kind in kinds for path in SOURCES.glob(kind))
 
 
+def _compiled_sources() -> list[Path]:
+    """Files of the contact model that the compiler reads."""
+    return [SOURCES / _MODEL, *sorted(SOURCES.glob("*.h"))]
+
+
 def model_version() -> dict[str, Any]:
     """Version of the forces of the contact model, and SHA-256 of the sources that are compiled."""
-    (line,) = _FORCES_VERSION.findall((SOURCES / "bridge.cpp").read_bytes())
-    sources = {name: checksum(SOURCES / name) for name in _MODEL}
+    (line,) = _FORCES_VERSION.findall((SOURCES / _MODEL).read_bytes())
+    sources = {path.name: checksum(path) for path in _compiled_sources()}
     return {"forces_version": int(line.split()[-1]), "sources": sources}
 
 
@@ -156,8 +161,8 @@ def model_sha256(engine: Engine) -> str | None:
 def _place() -> tuple[Path, str]:
     """Path of the compiled model, and SHA-256 of options, sources and library from which it is compiled."""
     fingerprint = hashlib.sha256("\0".join(_OPTIONS).encode())
-    for name in _MODEL:
-        fingerprint.update((SOURCES / name).read_bytes())
+    for source in _compiled_sources():
+        fingerprint.update(source.read_bytes())
     for library in sorted(Path("/usr/lib").glob("*/libliggghts.so.3")):  # another file after an upgrade
         fingerprint.update(f"{library.resolve()} {library.stat().st_mtime_ns} {library.stat().st_size}".encode())
     return cache_folder() / f"bridge-{fingerprint.hexdigest()[:16]}.so", fingerprint.hexdigest()
@@ -195,7 +200,7 @@ def _compile(place: Path, fingerprint: str) -> None:
     linked = [f"-Wl,--version-script={SOURCES / 'bridge.map'}", *_LINKED]
     with tempfile.TemporaryDirectory(dir=make_cache_folder()) as folder:
         library = Path(folder) / place.name
-        command = [compiler, *_OPTIONS, f"-I{SOURCES}", *included, str(SOURCES / "bridge.cpp"), "-o", str(library)]
+        command = [compiler, *_OPTIONS, f"-I{SOURCES}", *included, str(SOURCES / _MODEL), "-o", str(library)]
         done = subprocess.run([*command, *linked], capture_output=True, text=True, errors="replace", check=False)
         if done.returncode:
             error = next((line for line in done.stderr.splitlines() if "error" in line), "nothing")
