@@ -273,7 +273,7 @@ def test_a_dry_contact_with_a_wall_begins_without_friction(bench: Bench) -> None
     assert np.abs(series.forces[41:, 0, :2]).max() < 1e-9 * abs(shear)
 
 
-FORCES = {8: "8d6f0e8c43d7025e"}
+FORCES = {8: "e828c341160df6d4"}
 
 
 def test_a_change_of_the_contact_model_asks_for_another_version_of_its_forces() -> None:
@@ -332,9 +332,9 @@ def test_a_machine_without_wide_instructions_gives_the_same_bytes(
     case = load_case("cluster", {"run.cycles": 8})
     wide = run(case, own_cache / "wide").motion
     sources, clones = shutil.copytree(SOURCES, own_cache / "engine"), ', target_clones("avx512f", "avx2", "default")'
-    text = (SOURCES / "law.h").read_text()
+    text = (SOURCES / "forces.h").read_text()
     assert text.count(clones) == 1
-    (sources / "law.h").write_text(text.replace(clones, ""))
+    (sources / "forces.h").write_text(text.replace(clones, ""))
     monkeypatch.setattr(binary, "SOURCES", sources)
     narrow = run(case, own_cache / "narrow").motion
     for name in ("position", "velocity", "spin"):

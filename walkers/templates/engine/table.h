@@ -1,18 +1,29 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Copyright (c) 2026, the granular-walkers developers
-/* Forces of a bridge against the gap, from a file with a table for each two surfaces that may meet; '#' begins a comment:
+/* The table of a bridge: its capillary force and its resistances against the gap.
 
-       bridge TYPE TYPE RADIUS RADIUS           atom types, radii in m; that of a wall is "inf"
+   A file has a table for each two surfaces that may meet; '#' begins a comment:
+
+       bridge TYPE TYPE RADIUS RADIUS           atom types, radii in m; a wall's radius is "inf"
        [liquid VOLUME SHARE SHARE FILM FILM]    of beads whose liquid is conserved (README.md), m3
        range FORMATION RUPTURE SCALE OCTAVES CELLS
-       GAP PULL NORMAL SLIDING COUPLING ROLLING (3 * CELLS * (OCTAVES + 2) + 1 such rows, by the gap: m, N, N s/m, N s/m,
-                                                N s, N m s); COUPLING has its sign where i is the first of the two
+       GAP PULL NORMAL SLIDING COUPLING ROLLING
 
-   Near contact the gap h is divided by octaves of 1 + h/SCALE, each into CELLS cells (a power of two), up to
-   m = SCALE (2^OCTAVES - 1); beyond it are 2 CELLS cells, even in sqrt((RUPTURE - h)/(RUPTURE - m)), for the pull of a
-   bridge may end with an infinite slope. Within a cell forces are cubic, through rows at its begin, at 1/3 and 2/3 of it
-   and the next one; the last row is the rupture. The row at part t of cell c is in octave k (from 0) at
-   h = SCALE (2^k (1 + (c + t)/CELLS) - 1), beyond m at h = m + (RUPTURE - m) (1 - (1 - (c + t)/(2 CELLS))^2). */
+   Of the last line there are 3 CELLS (OCTAVES + 2) + 1, in the order of their gaps. Units are m,
+   N, N s/m, N s/m, N s and N m s. COUPLING has its sign where i is the first of the two
+   surfaces.
+
+   Near contact the gap h is divided into octaves of 1 + h/SCALE, and each octave into CELLS
+   cells (a power of two), up to m = SCALE (2^OCTAVES - 1). Beyond m there are 2 CELLS cells of
+   equal steps in sqrt((RUPTURE - h)/(RUPTURE - m)), because the force may end with an infinite
+   slope. Within a cell the columns are cubic polynomials through four rows: at the start of the
+   cell, at 1/3 and 2/3 of it, and at the start of the next one. The last row is the rupture. The
+   row at part t of cell c is at
+
+       h = SCALE (2^k (1 + (c + t)/CELLS) - 1)                            in octave k, from 0
+       h = m + (RUPTURE - m) (1 - (1 - (c + t)/(2 CELLS))^2)              beyond m
+
+   The program writes these files (walkers/templates/bridge_tables.py). */
 #ifndef BRIDGE_TABLE_H
 #define BRIDGE_TABLE_H
 
@@ -79,7 +90,8 @@ public:
   double radius[2], formation, rupture, contact[COLUMNS];
   double volume, share[2], film[2];  // m3; the volume is 0 where liquid is not conserved
 
-  /* The forces at a gap, which are those of the contact or are written to a place. */
+  /* The columns at a gap: a pointer to those at contact, or to place, where they are
+     interpolated. */
   const double *at(const double gap, double *const place) const
   {
     if (gap <= 0.) return contact;
@@ -99,15 +111,18 @@ public:
       t = y - number;
     }
     for (int c = 0; c < COLUMNS; c++)
-      place[c] = ((cell->coefficient[3][c] * t + cell->coefficient[2][c]) * t + cell->coefficient[1][c]) * t
-               + cell->coefficient[0][c];
+      place[c] =
+        ((cell->coefficient[3][c] * t + cell->coefficient[2][c]) * t + cell->coefficient[1][c]) * t
+        + cell->coefficient[0][c];
     return place;
   }
 
   bool joins(const int type_1, const int type_2, const double radius_1, const double radius_2) const
   {
-    return (type_1 == type[0] && type_2 == type[1] && same(radius_1, radius[0]) && same(radius_2, radius[1]))
-        || (type_1 == type[1] && type_2 == type[0] && same(radius_1, radius[1]) && same(radius_2, radius[0]));
+    return (type_1 == type[0] && type_2 == type[1] && same(radius_1, radius[0])
+            && same(radius_2, radius[1]))
+        || (type_1 == type[1] && type_2 == type[0] && same(radius_1, radius[1])
+            && same(radius_2, radius[0]));
   }
 
   bool begins_with(const double radius_1) const { return same(radius_1, radius[0]); }
@@ -121,7 +136,8 @@ public:
     std::string word = words.next();
     volume = 0.;
     if (word == "liquid") {
-      for (double *const number : {&volume, &share[0], &share[1], &film[0], &film[1]}) *number = words.number();
+      for (double *const number : {&volume, &share[0], &share[1], &film[0], &film[1]})
+        *number = words.number();
       if (!(volume > 0. && share[0] > 0. && share[1] >= 0. && film[0] > 0. && film[1] > 0.))
         throw std::runtime_error("the liquid of a table is not usable");
       word = words.next();
@@ -133,8 +149,8 @@ public:
     const int octaves = static_cast<int>(words.number()), cells = static_cast<int>(words.number());
     int power = 0;
     while ((1 << power) < cells) power++;
-    if (!(scale > 0. && rupture > 0. && formation >= 0. && formation <= rupture) || octaves < 0 || octaves > 60
-        || cells != (1 << power) || power > 12)
+    if (!(scale > 0. && rupture > 0. && formation >= 0. && formation <= rupture) || octaves < 0
+        || octaves > 60 || cells != (1 << power) || power > 12)
       throw std::runtime_error("the range of a table is not usable");
     inverse_scale = 1. / scale;
     shift = 52 - power;
@@ -142,7 +158,8 @@ public:
     part = std::ldexp(1., -shift);
     first = static_cast<uint64_t>(1023) << power;
     middle = scale * (std::ldexp(1., octaves) - 1.);
-    if (!(middle < rupture)) throw std::runtime_error("the octaves of a table reach beyond the rupture");
+    if (!(middle < rupture))
+      throw std::runtime_error("the octaves of a table reach beyond the rupture");
     inverse_rest = 1. / (rupture - middle);
     std::vector<double> rows(COLUMNS * static_cast<size_t>(3 * cells * (octaves + 2) + 1));
     double before = -1.;
@@ -155,7 +172,8 @@ public:
     std::memcpy(contact, rows.data(), sizeof(contact));
     near_.clear();
     for (int octave = 0; octave < octaves; octave++)
-      for (int number = 0; number < cells; number++) near_.push_back(cell(&rows[3 * COLUMNS * near_.size()]));
+      for (int number = 0; number < cells; number++)
+        near_.push_back(cell(&rows[3 * COLUMNS * near_.size()]));
     far_.clear();
     for (int number = 0; number < 2 * cells; number++)
       far_.push_back(cell(&rows[3 * COLUMNS * (near_.size() + far_.size())]));
@@ -168,13 +186,17 @@ private:
   double part;
   std::vector<Cell> near_, far_;
 
-  static bool same(const double a, const double b) { return a == b || std::fabs(a - b) <= 1e-9 * std::fabs(a); }
+  static bool same(const double a, const double b)
+  {
+    return a == b || std::fabs(a - b) <= 1e-9 * std::fabs(a);
+  }
 
   static Cell cell(const double *const row)
   {
     Cell made;
     for (int c = 0; c < COLUMNS; c++) {
-      const double f0 = row[c], f1 = row[c + COLUMNS], f2 = row[c + 2 * COLUMNS], f3 = row[c + 3 * COLUMNS];
+      const double f0 = row[c], f1 = row[c + COLUMNS];
+      const double f2 = row[c + 2 * COLUMNS], f3 = row[c + 3 * COLUMNS];
       made.coefficient[0][c] = f0;
       made.coefficient[1][c] = -5.5 * f0 + 9. * f1 - 4.5 * f2 + f3;
       made.coefficient[2][c] = 9. * f0 - 22.5 * f1 + 18. * f2 - 4.5 * f3;

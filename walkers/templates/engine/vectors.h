@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Copyright (c) 2026, the granular-walkers developers
-/* Vectors, and the rows of three numbers of the engine as vectors. */
+/* Vectors of three numbers, and rows of the engine's arrays as such vectors. */
 #ifndef BRIDGE_VECTORS_H
 #define BRIDGE_VECTORS_H
 

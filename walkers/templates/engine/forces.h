@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-2.0-or-later
+// Copyright (c) 2026, the granular-walkers developers
+/* Forces and torques of contacts and bridges between two spheres, or a sphere and a wall.
+
+   The unit vector n points from j to i, h is the gap between the surfaces, l_i = R_i + h/2 and
+   l_j = R_j + h/2 are the distances of the centres from the middle of the contact. R* and m* are
+   the reduced radius and mass; at a wall they are those of the sphere. The relative motion is
+
+       normal    w = v · n                                    with v = v_i - v_j
+       sliding   s = v - w n + n × (l_i ω_i + l_j ω_j)
+       rolling   q = n × (ω_i - ω_j)
+
+   The force on i is F = (F_el - P - (c_n + N) w) n - T with T = T_c + S s + C q, that on j is
+   -F. The torques are
+
+       l_i n × T + n × (C s + Q q) - M_r    on i
+       l_j n × T - n × (C s + Q q) + M_r    on j
+
+   The pull P and the resistances N, S, C and Q belong to the bridge and come from its table; the
+   laws and their sources stand in walkers/physics/laws. Surfaces that overlap by d = -h > 0 also
+   have
+
+       repulsion           F_el = 4/3 E* √R* d^(3/2)                                        [1]
+       normal damping      c_n = 2 √(5/6) β √(k_n m*)   with k_n = 2 E* √(R* d)             [2]
+       tangential spring   k_t = 8 G* √(R* d) times the elongation ∫ s dt along the surfaces  [3]
+       tangential damping  c_t = 2 √(5/6) β √(k_t m*)
+       Coulomb's limit     |T_c| ≤ μ F_el for the sum of spring and damping
+       rolling friction    M_r = μ_r F_el R* (ω - (ω · n) n)/|ω|   with ω = ω_i - ω_j         [4]
+
+   The damping ratio β follows from the restitution, e = exp(-πβ/√(1 - β²)). A spring that
+   exceeds Coulomb's limit slips: it is shortened to the limit and has no damping.
+
+   [1] H. Hertz, J. reine angew. Math. 92 (1882) 156, doi 10.1515/crll.1882.92.156
+   [2] Tsuji et al., doi 10.1016/0032-5910(92)88030-L
+   [3] R. D. Mindlin, J. Appl. Mech. 16 (1949) 259
+   [4] Ai et al., doi 10.1016/j.powtec.2010.09.030: constant directional torque, "cdt" in LIGGGHTS */
+#ifndef BRIDGE_FORCES_H
+#define BRIDGE_FORCES_H
+
+#include "table.h"
+#include "vectors.h"
+
+namespace {
+
+/* For loops over contacts: the compiler computes eight, four or two contacts at once, with the same
+   digits. The library contains all three versions and chooses one when it is loaded. */
+#if defined(__x86_64__)
+#define BY_LANES __attribute__((noinline, target_clones("avx512f", "avx2", "default")))
+#else
+#define BY_LANES __attribute__((noinline))
+#endif
+
+/* Coefficients of the contacts between two atom types. */
+struct Materials {
+  double stiffness;         // 4/3 E*
+  double shear_stiffness;   // 8 G*
+  double damping;           // 2 √(5/6) β √(2 E*)
+  double shear_damping;     // 2 √(5/6) β √(8 G*)
+  double friction;          // μ
+  double rolling_friction;  // μ_r
+};
+
+/* Places in the history of a contact: number of its table (law.h) and elongation of its spring. */
+enum { TABLE, SPRING, HISTORY = SPRING + 3 };
+
+/* Contacts between the same two materials, whose forces are computed together. */
+struct Batch {
+  enum { CAPACITY = 32, LANES = 8 };
+  typedef double Numbers[CAPACITY];
+  struct Vecs {
+    Numbers x, y, z;
+    inline Vec get(const int k) const { return {x[k], y[k], z[k]}; }
+    inline void put(const int k, const Vec a) { x[k] = a.x, y[k] = a.y, z[k] = a.z; }
+  };
+
+  Vecs d;  // from j to i
+  Vecs v;  // of i relative to j
+  Vecs omega_i, omega_j;
+  Vecs spring;  // its elongation
+  Numbers radius_i, radius_j, mass_i, mass_j;
+  Numbers bridge[bridge::COLUMNS];  // pull and resistances
+  Numbers inverse;                  // of the length of d
+  Numbers gap, reduced_radius, reduced_mass;
+  Vecs force, torque_i, torque_j;  // results; the force is that on i
+  int count, i[CAPACITY], j[CAPACITY];
+  const Materials *materials;
+  double *history[CAPACITY];
+
+  /* The count rounded up to whole lanes; what the lanes beyond it compute is not used. */
+  int padded_count() const { return (count + LANES - 1) / LANES * LANES; }
+};
+
+/* The contacts that are being gathered. One for all: the engine computes with one thread. */
+Batch batch __attribute__((aligned(64)));
+
+/* Computes gaps, reduced radii and reduced masses of pairs of spheres. */
+BY_LANES void measure_pairs()
+{
+  Batch &b = batch;
+  for (int k = 0, count = b.padded_count(); k < count; k++) {
+    const double distance = length(b.d.get(k)), sum = b.radius_i[k] + b.radius_j[k];
+    b.inverse[k] = 1. / distance;
+    b.gap[k] = distance - sum;
+    b.reduced_radius[k] = b.radius_i[k] * b.radius_j[k] / sum;
+    b.reduced_mass[k] = b.mass_i[k] * b.mass_j[k] / (b.mass_i[k] + b.mass_j[k]);
+  }
+}
+
+/* Computes the forces and torques of the batch. Springs stretch for time_step, s. */
+template<bool ROLLING_FRICTION>
+__attribute__((always_inline)) inline void compute_batch(const double time_step)
+{
+  Batch &b = batch;
+  const Materials materials = *b.materials;
+  for (int k = 0, count = b.padded_count(); k < count; k++) {
+    const Vec d = b.d.get(k), v = b.v.get(k);
+    const Vec omega_i = b.omega_i.get(k), omega_j = b.omega_j.get(k);
+    const double gap = b.gap[k], separation = b.inverse[k] * dot(v, d);
+    const double arm_i = b.radius_i[k] + 0.5 * gap, arm_j = b.radius_j[k] + 0.5 * gap;
+    const Vec n = b.inverse[k] * d, spin = omega_i - omega_j, rolling = cross(n, spin);
+    const Vec sliding = v - separation * n + cross(n, arm_i * omega_i + arm_j * omega_j);
+
+    // Surfaces apart have no overlap, so that all terms of the contact vanish without a branch.
+    const double overlap = gap < 0. ? -gap : 0.;
+    const double root = std::sqrt(b.reduced_radius[k] * overlap);
+    const double elastic = materials.stiffness * root * overlap;
+    const double damping = std::sqrt(root * b.reduced_mass[k]);
+
+    Vec elongation = b.spring.get(k) + time_step * sliding;
+    elongation = elongation - dot(elongation, n) * n;  // the spring turns with the contact
+    Vec tangential = materials.shear_stiffness * root * elongation;
+    const double limit = materials.friction * elastic, spring_squared = dot(tangential, tangential);
+    const bool slips = spring_squared > limit * limit;
+    tangential = tangential + (slips ? 0. : materials.shear_damping * damping) * sliding;
+    const double size = std::sqrt(slips ? spring_squared : dot(tangential, tangential));
+    const double ratio = limit / (size + 1e-150), factor = ratio < 1. ? ratio : 1.;
+    b.spring.put(k, (slips ? factor : 1.) * elongation);
+
+    const double coupling = b.bridge[bridge::COUPLING][k];
+    tangential = factor * tangential + b.bridge[bridge::SLIDING][k] * sliding + coupling * rolling;
+    const double resistance = materials.damping * damping + b.bridge[bridge::NORMAL][k];
+    const double normal = elastic - b.bridge[bridge::PULL][k] - resistance * separation;
+    b.force.put(k, normal * n - tangential);
+
+    const Vec turn = cross(n, tangential);
+    Vec couple = cross(n, coupling * sliding + b.bridge[bridge::ROLLING][k] * rolling);
+    if (ROLLING_FRICTION) {
+      const double speed = length(spin) + 1e-150;
+      const double moment = materials.rolling_friction * elastic * b.reduced_radius[k] / speed;
+      couple = couple - moment * (spin - dot(spin, n) * n);
+    }
+    b.torque_i.put(k, arm_i * turn + couple);
+    b.torque_j.put(k, arm_j * turn - couple);
+  }
+}
+
+/* Computes the forces and torques of the batch; with update, springs stretch for a step and the
+   histories are written. */
+BY_LANES void compute_batch(const bool rolling_friction, const bool update, const double time_step)
+{
+  const double stretched = update ? time_step : 0.;
+  if (rolling_friction) compute_batch<true>(stretched);
+  else compute_batch<false>(stretched);
+  if (!update) return;
+  for (int k = 0; k < batch.count; k++) vec(batch.history[k] + SPRING) = batch.spring.get(k);
+}
+
+}
+#endif
