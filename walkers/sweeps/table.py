@@ -94,7 +94,7 @@ def load(directory: str | Path) -> pd.DataFrame:
 def _declared(sweep: Sweep) -> list[str]:
     """The numbers of results of a sweep's cases, without numbers of single beads; empty if a case cannot be read."""
     with suppress(InputError):
-        groups = modules_of(next(sweep.cases()))
+        groups = [module.NAME for module in modules_of(next(sweep.cases()))]
         return [number.name for group in [*groups, "drive"] for number in GROUPS[group] if number.name[-1] != "*"]
     return []
 

@@ -22,6 +22,8 @@ from walkers.postprocess.measure.motion import Bridges, Motion
 from walkers.postprocess.measure.numbers import Measured
 from walkers.postprocess.measure.tables import columns_of
 
+NAME = "meetings"
+
 _SLOW = 0.1
 """Walkers below this fraction of the speed of free walkers are slow."""
 _END = 0.1

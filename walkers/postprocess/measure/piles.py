@@ -17,6 +17,8 @@ from walkers.postprocess.measure.motion import Bridges, Motion, read_bridges
 from walkers.postprocess.measure.numbers import Measured
 from walkers.postprocess.measure.tables import Columns, read_columns
 
+NAME = "piles"
+
 _WHOLE = 1.0 - 1e-6
 """Fraction of the duration below which a run ended early."""
 

@@ -63,7 +63,7 @@ def _quantities(entries: Mapping[str, str | list[str]]) -> tuple[Quantity, ...]:
 TABLES: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(columns) for name, columns in _FILE["tables"].items()}
 """The columns of the tables of runs, in their order."""
 GROUPS: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(group) for name, group in _FILE["numbers"].items()}
-"""The numbers of results: of each module of `walkers.postprocess.measure.results.modules_of`, and of all."""
+"""The numbers of results: of each module of `walkers.postprocess.measure.results.MODULES`, and of all."""
 SHOWN: Mapping[str, frozenset[str]] = {name: frozenset(names) for name, names in _FILE["shown"].items()}
 """Which numbers are shown (`walkers.postprocess.measure.numbers.rows`), and which are of walkers that face up."""
 LABELS: Mapping[str, Mapping[str, str]] = _FILE["labels"]

@@ -9,6 +9,8 @@ from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.motion import Motion
 from walkers.postprocess.measure.numbers import Measured
 
+NAME = "record"
+
 
 def applies(case: Case) -> bool:
     """Whether the drive of a case is a record that does not repeat."""

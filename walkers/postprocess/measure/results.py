@@ -1,8 +1,7 @@
 """Results of runs: measured and written once, read by all.
 
-A result is flat: a number of each name of `walkers.postprocess.measure.quantities.GROUPS`. Each
-module of `modules_of` has three functions: ``applies(case)``; ``derived(case)``, numbers that follow
-from the case alone; and ``measure(motion)``.
+A result is flat: a number of each name of `walkers.postprocess.measure.quantities.GROUPS`. The modules
+of `MODULES` that apply to a case measure its runs.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from walkers.inputs.resolving.loads import gravity_warnings, softness_warning
 from walkers.inputs.tables.run import limits_of
 from walkers.postprocess.measure import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.measure.caption import conditions
+from walkers.postprocess.measure.measuring_module import MeasuringModule
 from walkers.postprocess.measure.motion import read_motion
 from walkers.postprocess.measure.numbers import MAIN, headline, rows, state
 from walkers.postprocess.measure.tables import Columns, read_columns, read_table, write_table
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 
 VERSION = 2
 """Of all methods together: a result of another version is measured again."""
+MODULES: tuple[MeasuringModule, ...] = (walking, threshold, meetings, piles, record_part)
+"""The modules that measure runs, in the order of their numbers in results."""
 _BESIDE = ("case", "drive", "rests_on", "by_hand", "tables", "warnings")
 """Entries of ``result.json`` beside the numbers."""
 _DRIVE = ("frequency", "peak_acceleration", "peak_velocity", "amplitude")
@@ -75,22 +77,15 @@ class Results(dict[str, Any]):
         return {**self.about, **plain(self), "warnings": list(self.warnings)}
 
 
-def modules_of(case: Case) -> dict[str, Any]:
-    """The modules that measure a case, in the order of results, by the groups of their numbers."""
-    modules = {
-        "walking": walking,
-        "threshold": threshold,
-        "meetings": meetings,
-        "piles": piles,
-        "record": record_part,
-    }
-    return {name: module for name, module in modules.items() if module.applies(case)}
+def modules_of(case: Case) -> list[MeasuringModule]:
+    """The modules that measure a case, in the order of their numbers in results."""
+    return [module for module in MODULES if module.applies(case)]
 
 
 def derived(case: Case) -> dict[str, Any]:
     """Numbers of a result that follow from the case alone."""
     numbers = {name: getattr(case.excitation, name) for name in _DRIVE}
-    for module in modules_of(case).values():
+    for module in modules_of(case):
         numbers |= module.derived(case)
     return numbers
 
@@ -104,7 +99,7 @@ def measure(directory: Path) -> None:
     check_unchanged(directory, files_of_segments(directory))
     motion = read_motion(directory)
     case = motion.case
-    parts = [module.measure(motion) for module in modules_of(case).values()]
+    parts = [module.measure(motion) for module in modules_of(case)]
     tables = {name: columns for part in parts for name, columns in part.tables.items()}
     numbers = derived(case) | {"goes_uphill": case.goes_uphill, "truncated": motion.truncated}
     for part in parts:

@@ -24,6 +24,8 @@ from walkers.postprocess.measure.motion import Motion
 from walkers.postprocess.measure.numbers import Measured
 from walkers.postprocess.measure.sides import REST
 
+NAME = "threshold"
+
 WINDOW = 8
 """Cycles of a window."""
 _COARSE = 0.3

@@ -25,6 +25,8 @@ from walkers.postprocess.measure.sides import REST, SAME, SEPARATED, STEADY_SPEE
 from walkers.postprocess.measure.tables import Columns, numbered
 from walkers.rounding import counted, percent
 
+NAME = "walking"
+
 _LONGER = 1.5
 """Cycles of a run in which walkers turn over, over those until they have turned by 90°."""
 _OF_BEADS = ("rotation_", "sliding_", "open_")

@@ -1,0 +1,72 @@
+"""Interface of the modules that measure runs: `walking`, `threshold`, `meetings`, `piles`, `record_part`.
+
+Each module measures one kind of experiment: it tells which cases it applies to, and computes tables
+and numbers from the motion of a run. A case may have several of them: a tray of walkers that is
+shaken by a record has `walking`, `meetings` and `record_part`. The modules are listed in
+`walkers.postprocess.measure.results.MODULES`. Reading of dumps and writing of results are not their
+task.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from walkers.inputs.tables.case import Case
+    from walkers.postprocess.measure.motion import Motion
+    from walkers.postprocess.measure.numbers import Measured
+
+
+class MeasuringModule(Protocol):
+    """What a module that measures contains.
+
+    Attributes
+    ----------
+    NAME
+        Name of its numbers in `walkers.postprocess.measure.quantities.GROUPS`.
+    """
+
+    NAME: str
+
+    def applies(self, case: Case) -> bool:
+        """Tell whether the module measures the runs of a case.
+
+        Parameters
+        ----------
+        case
+            The resolved case.
+
+        Returns
+        -------
+        bool
+            Whether `derived` and `measure` can be called for this case.
+        """
+
+    def derived(self, case: Case) -> Mapping[str, Any]:
+        """Compute the numbers that follow from the case without a run.
+
+        Parameters
+        ----------
+        case
+            A case to which the module applies.
+
+        Returns
+        -------
+        mapping of str to number
+            Numbers in SI units by their names in `GROUPS`; empty if there are none.
+        """
+
+    def measure(self, motion: Motion) -> Measured:
+        """Measure a run.
+
+        Parameters
+        ----------
+        motion
+            Motion of the beads of a run to whose case the module applies; the run may be unfinished.
+
+        Returns
+        -------
+        Measured
+            Tables, numbers in SI units, and reasons to doubt them.
+        """
