@@ -37,7 +37,7 @@ from walkers.inputs.sweep import Sweep, load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.paper.make import COMPARED, FIGURES, make_figures
 from walkers.paper.sources import sweep_of
-from walkers.postprocess.measure.results import VERSION
+from walkers.postprocess.measure.results import VERSION, modules_of
 from walkers.postprocess.show.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
 from walkers.second_engine import experiments
 from walkers.second_engine.benchmarks import curve_of, published
@@ -291,10 +291,19 @@ def _make_calibration(out: Path, docs: Path) -> None:
         shutil.copy(out / "ruby" / name, docs / file)
 
 
+def _changed_modules(cases: Iterable[Case]) -> dict[str, int]:
+    """Versions of the modules that measure the cases, where they differ from that of results."""
+    modules = [module for case in cases for module in modules_of(case)]
+    return {module.NAME: module.VERSION for module in modules if module.VERSION != VERSION}
+
+
 def digest(illustration: Illustration) -> str:
     """Twelve hex digits over the cases of an illustration and its versions; the engine binary does not count."""
-    cases = [case.determinants() for case in illustration.cases()]
-    contents = {"cases": cases, **illustration.versions._asdict()}
+    cases = list(illustration.cases())
+    determinants = [case.determinants() for case in cases]
+    contents = {"cases": determinants, **illustration.versions._asdict()}
+    if illustration.versions == _TODAY and (changed := _changed_modules(cases)):
+        contents["modules"] = changed
     return hashlib.sha256(json.dumps(contents, sort_keys=True).encode()).hexdigest()[:12]
 
 

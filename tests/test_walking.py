@@ -23,19 +23,20 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.loads import contact_loads, dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
+from walkers.postprocess.measure import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.gait import averages, gait, settled_samples, turns_away_after, walk
 from walkers.postprocess.measure.motion import Group, read_bridges, read_motion
 from walkers.postprocess.measure.numbers import rows
 from walkers.postprocess.measure.quantities import TABLES, axis, declared, matches
-from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.results import modules_of, read
 from walkers.postprocess.measure.sides import sides
 from walkers.postprocess.measure.tables import read_columns, read_table, write_table
 from walkers.postprocess.measure.walking import measure, walkers_met
 from walkers.postprocess.show.figures import figures_of
 from walkers.progress import Progress
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import FIRST_SEGMENT, case_of, segment_directories
+from walkers.runner.directory import FIRST_SEGMENT, case_of, leave_out_dumps, recomputed, segment_directories
 from walkers.runner.manifest import RESULT_NAME, read_manifest
 from walkers.runs.making import make_runs
 from walkers.theory.mathieu import turning_rate
@@ -194,6 +195,74 @@ def test_a_result_is_measured_again_by_walkers_run_alone(directory: Path, tmp_pa
         dump.unlink()
     with pytest.raises(InputError, match="cannot be read"):
         walkers.run(copy)
+
+
+@pytest.mark.parametrize(
+    ("case", "changes", "names"),
+    [
+        ("fig1b", {}, ["walking"]),
+        ("fig1b", {"drive.ramp": [["0 s", 1], ["0.5 s", 0.2]]}, ["walking", "threshold"]),
+        ("tray", {}, ["walking", "meetings"]),
+        ("pile-ci", {}, ["piles"]),
+    ],
+)
+def test_modules_measure_the_cases_to_which_they_apply(case: str, changes: dict[str, Any], names: list[str]) -> None:
+    assert [module.NAME for module in modules_of(load_case(case, changes))] == names
+
+
+def _without_versions_of_modules(run: Path) -> None:
+    """Write the result of a run as it was written before modules had versions."""
+    contents = read_json(run / RESULT_NAME)
+    del contents["modules"]
+    with recomputed(run, [RESULT_NAME]):
+        write_json(run / RESULT_NAME, contents)
+
+
+@pytest.mark.parametrize("has_versions", [True, False], ids=["versions of modules", "one version"])
+def test_a_module_outdates_only_results_that_it_measured(
+    has_versions: bool, directory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run without dumps, which cannot be measured again, survives a change of any other module."""
+    run = Path(shutil.copytree(directory, tmp_path / directory.name))
+    leave_out_dumps(run)
+    if not has_versions:
+        _without_versions_of_modules(run)
+    right, written = read(run).as_dict(), (run / RESULT_NAME).read_bytes()
+    for module in (piles, meetings, threshold, record_part):
+        monkeypatch.setattr(module, "VERSION", module.VERSION + 1)
+    assert read(run).as_dict() == right
+    assert walkers.run(run).result.as_dict() == right
+    assert (run / RESULT_NAME).read_bytes() == written
+    monkeypatch.setattr(walking, "VERSION", walking.VERSION + 1)
+    with pytest.raises(InputError, match=f"another version of the program; walkers run {run} measures it again"):
+        read(run)
+    with pytest.raises(InputError, match="cannot be read"):
+        walkers.run(run)
+    assert (run / RESULT_NAME).read_bytes() == written
+
+
+@pytest.mark.parametrize("has_versions", [True, False], ids=["versions of modules", "one version"])
+def test_a_run_with_dumps_is_measured_again_by_a_changed_module(
+    has_versions: bool, directory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its result contains the new version, and those of no modules that do not measure it."""
+    run = Path(shutil.copytree(directory, tmp_path / directory.name))
+    assert read_json(run / RESULT_NAME)["modules"] == {"walking": walking.VERSION}
+    if not has_versions:
+        _without_versions_of_modules(run)
+    right = read(run).as_dict()
+    monkeypatch.setattr(walking, "VERSION", walking.VERSION + 1)
+    assert walkers.run(run).result.as_dict() == right
+    assert read_json(run / RESULT_NAME)["modules"] == {"walking": walking.VERSION}
+
+
+def test_a_result_of_a_module_that_has_ended_is_outdated(directory: Path, tmp_path: Path) -> None:
+    run = Path(shutil.copytree(directory, tmp_path / directory.name))
+    contents = read_json(run / RESULT_NAME)
+    contents["modules"]["ended"] = 1
+    write_json(run / RESULT_NAME, contents)
+    with pytest.raises(InputError, match="was measured by another version of the program"):
+        read(run)
 
 
 def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: RunDirectory) -> None:

@@ -24,10 +24,16 @@ class MeasuringModule(Protocol):
     Attributes
     ----------
     NAME
-        Name of its numbers in `walkers.postprocess.measure.quantities.GROUPS`.
+        Name of its numbers in `walkers.postprocess.measure.quantities.GROUPS`, and of its version in
+        ``result.json``.
+    VERSION
+        Version of its method: raise it if the module gives other numbers or tables for the same
+        dumps, also where the change is in a function that it calls. Results that other modules
+        measured stay valid.
     """
 
     NAME: str
+    VERSION: int
 
     def applies(self, case: Case) -> bool:
         """Tell whether the module measures the runs of a case.

@@ -23,6 +23,7 @@ from walkers.postprocess.measure.numbers import Measured
 from walkers.postprocess.measure.tables import columns_of
 
 NAME = "meetings"
+VERSION = 2
 
 _SLOW = 0.1
 """Walkers below this fraction of the speed of free walkers are slow."""

@@ -18,6 +18,7 @@ from walkers.postprocess.measure.numbers import Measured
 from walkers.postprocess.measure.tables import Columns, read_columns
 
 NAME = "piles"
+VERSION = 2
 
 _WHOLE = 1.0 - 1e-6
 """Fraction of the duration below which a run ended early."""

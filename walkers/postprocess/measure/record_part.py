@@ -10,6 +10,7 @@ from walkers.postprocess.measure.motion import Motion
 from walkers.postprocess.measure.numbers import Measured
 
 NAME = "record"
+VERSION = 2
 
 
 def applies(case: Case) -> bool:

@@ -1,7 +1,10 @@
 """Results of runs: measured and written once, read by all.
 
 A result is flat: a number of each name of `walkers.postprocess.measure.quantities.GROUPS`. The modules
-of `MODULES` that apply to a case measure its runs.
+of `MODULES` that apply to a case measure its runs. ``result.json`` contains their versions: it is
+outdated if one of these modules, or what all results have in common, has another version now. Runs
+without dumps, such as those of a spread, cannot be measured again, and a change of a module that did
+not measure them must not cost them.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from walkers.postprocess.measure.numbers import MAIN, headline, rows, state
 from walkers.postprocess.measure.tables import Columns, read_columns, read_table, write_table
 from walkers.postprocess.measure.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
 from walkers.rounding import counted, percent
-from walkers.runner.directory import SEGMENT_NAME, files_of_segments, recomputed, segment_directories
+from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, recomputed, segment_directories
 from walkers.runner.manifest import RESULT_NAME, check_unchanged
 
 if TYPE_CHECKING:
@@ -34,9 +37,13 @@ if TYPE_CHECKING:
     from walkers.inputs.tables.case import Case
 
 VERSION = 2
-"""Of all methods together: a result of another version is measured again."""
+"""Version of what all results have in common: the format of ``result.json`` and the numbers, tables and warnings that
+no module gives. Results of another version are measured again, whatever modules measured them.
+"""
 MODULES: tuple[MeasuringModule, ...] = (walking, threshold, meetings, piles, record_part)
 """The modules that measure runs, in the order of their numbers in results."""
+_BEFORE_MODULES = 2
+"""Version of all modules in results that do not contain versions of modules."""
 _BESIDE = ("case", "drive", "rests_on", "by_hand", "tables", "warnings")
 """Entries of ``result.json`` beside the numbers."""
 _DRIVE = ("frequency", "peak_acceleration", "peak_velocity", "amplitude")
@@ -99,7 +106,8 @@ def measure(directory: Path) -> None:
     check_unchanged(directory, files_of_segments(directory))
     motion = read_motion(directory)
     case = motion.case
-    parts = [module.measure(motion) for module in modules_of(case)]
+    modules = modules_of(case)
+    parts = [module.measure(motion) for module in modules]
     tables = {name: columns for part in parts for name, columns in part.tables.items()}
     numbers = derived(case) | {"goes_uphill": case.goes_uphill, "truncated": motion.truncated}
     for part in parts:
@@ -115,6 +123,7 @@ def measure(directory: Path) -> None:
         warnings.append("the dump ends within a frame")
     contents = {
         "version": VERSION,
+        "modules": {module.NAME: module.VERSION for module in modules},
         "case": case.name,
         "drive": conditions(case),
         "rests_on": rests_on(case.origins),
@@ -154,11 +163,31 @@ def read(directory: str | Path, origins: Sequence[Origin] | None = None) -> Resu
 
 
 def recorded(directory: Path) -> dict[str, Any]:
-    """What ``result.json`` contains, without bands and numerical errors; `InputError` as from `read`."""
+    """Read ``result.json`` of a run, without bands and numerical errors.
+
+    Parameters
+    ----------
+    directory
+        The run directory.
+
+    Returns
+    -------
+    dict
+        The numbers as ``numbers``, NaN if one is not defined, and the entries beside them.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, cannot be read or is outdated.
+    """
     again = f"walkers run {directory} measures it again"
     try:
         contents = read_json(directory / RESULT_NAME)
-        version, _ = contents.pop("version"), [contents[name] for name in _BESIDE]
+        version = contents.pop("version")
+        versions = contents.pop("modules", None)
+        if versions is not None:
+            versions = dict(versions)
+        _ = [contents[name] for name in _BESIDE]
         numbers = {name: nan if number is None else number for name, number in contents["numbers"].items()}
         if version == VERSION:  # every reader needs these numbers
             _ = numbers["goes_uphill"], "velocity" in numbers and numbers["facings_differ"]
@@ -167,9 +196,26 @@ def recorded(directory: Path) -> dict[str, Any]:
         raise refused(directory, f"has no {RESULT_NAME}; {again}") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise refused(directory, f"its {RESULT_NAME} cannot be read ({error}); {again}") from error
-    if version != VERSION:
+    try:
+        outdated = version != VERSION or _is_outdated(directory, versions)
+    except (OSError, ValueError) as error:
+        raise refused(directory, f"its case cannot be read ({error})") from error
+    if outdated:
         raise refused(directory, f"was measured by another version of the program; {again}")
     return contents
+
+
+def _is_outdated(directory: Path, versions: Mapping[str, Any] | None) -> bool:
+    """Tell whether a module that measured a result has another version now.
+
+    Results without ``versions`` were written before modules had any. Versions of modules began at
+    the version of these results; which modules measured them follows from the case.
+    """
+    if versions is None:
+        changed = [module for module in MODULES if module.VERSION != _BEFORE_MODULES]
+        return bool(changed) and any(module.applies(case_of(directory)) for module in changed)
+    present = {module.NAME: module.VERSION for module in MODULES}
+    return any(present.get(name) != version for name, version in versions.items())
 
 
 def ensure_measured(directory: Path) -> None:

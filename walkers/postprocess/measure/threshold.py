@@ -25,6 +25,7 @@ from walkers.postprocess.measure.numbers import Measured
 from walkers.postprocess.measure.sides import REST
 
 NAME = "threshold"
+VERSION = 2
 
 WINDOW = 8
 """Cycles of a window."""

@@ -26,6 +26,7 @@ from walkers.postprocess.measure.tables import Columns, numbered
 from walkers.rounding import counted, percent
 
 NAME = "walking"
+VERSION = 2
 
 _LONGER = 1.5
 """Cycles of a run in which walkers turn over, over those until they have turned by 90°."""
