@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import subprocess
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.conftest import SHORT, call, document, make_case, to_toml
+from tests.conftest import PROGRAM, SHORT, call, document, make_case, to_toml
 from walkers import Run, run
 from walkers.arrays import FloatArray, Vector
 from walkers.inputs.reading import load_case, shipped
@@ -357,12 +358,7 @@ def test_an_engine_that_fails_in_a_check_fails_the_check(own_cache: Path, front:
 
 def test_runs_name_the_audit_of_their_engine_and_contact_model(own_cache: Path) -> None:
     case = make_case(run=SHORT)
-    with pytest.warns(UnauditedEngineWarning, match="walkers check engine"):
-        unaudited = run(case, own_cache / "a")
-    assert _audit_of(unaudited) is None
-    with warnings.catch_warnings():  # it is said once
-        warnings.simplefilter("error", UnauditedEngineWarning)
-        run(make_case(run={**SHORT, "cycles": 5}), own_cache / "a")
+    assert _audit_of(run(case, own_cache / "a")) is None
     passed = {"passed": True, "lines": 80, "failures": [], "date": "2026-01-01T00:00:00Z"}
     write_audit(find_engine().sha256, {"contact_model": "0" * 64, **passed})
     assert _audit_of(run(case, own_cache / "b")) is None
@@ -378,17 +374,51 @@ def test_runs_name_the_audit_of_their_engine_and_contact_model(own_cache: Path) 
         assert read_audit(find_engine().sha256, None) is None
 
 
+def test_an_engine_without_an_audit_is_warned_of_once_in_a_process(
+    own_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing of it stays in the cache: the next process warns again."""
+    binary._warn_unaudited.cache_clear()
+    with pytest.warns(UnauditedEngineWarning, match="never audited .*: walkers check engine"):
+        run(make_case(run=SHORT), own_cache / "runs")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UnauditedEngineWarning)
+        run(make_case(run={**SHORT, "cycles": 5}), own_cache / "runs")
+    assert not list(own_cache.rglob("audits/*"))
+    (own_cache / "case.toml").write_text(to_toml(document(run=SHORT)))
+    command = [PROGRAM, "run", "case.toml", "--out", "anew"]
+    done = subprocess.run(command, cwd=own_cache, capture_output=True, text=True, check=True)
+    assert done.stderr.count("was never audited with its contact model: walkers check engine") == 1
+
+
 def test_an_engine_whose_check_failed_is_refused(own_cache: Path) -> None:
-    """`walkers run` says which check failed, and makes nothing."""
+    """`walkers run` says which check failed and what to do, and makes nothing."""
     engine = find_engine()
     right, wrong = Line("right", 1.0, 1.0, 0.1), Line("Hertz force", 1.0, 2.0, 0.1)
     record([right, wrong, right], engine, "3.8.0")
     (own_cache / "case.toml").write_text(to_toml(document(run=SHORT)))
     done = call("run", "case.toml", folder=own_cache)
     assert done.returncode == 1
-    assert "this engine failed its audit in 1 line(s), first: Hertz force" in done.stderr
+    (told,) = done.stderr.splitlines()
+    assert "failed its audit in 1 line(s), first: Hertz force" in told
+    assert f"walkers check engine --engine {engine.path}" in told
+    assert "another binary by --engine or WALKERS_ENGINE" in told
     with pytest.raises(AuditFailed, match="Hertz force"):
         run(make_case(run=SHORT), own_cache / "runs")
+    (own_cache / "sweep.toml").write_text('case = "case.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+    swept = call("sweep", "sweep.toml", folder=own_cache)
+    assert (swept.returncode, "first: Hertz force" in swept.stderr) == (1, True)
     assert not (own_cache / "runs").exists()
-    kept = _audit_of(run(make_case(run=SHORT), own_cache / "runs", allow_failed_audit=True))
-    assert (kept["failures"], kept["passed"], kept["lines"]) == (["Hertz force"], False, 3)
+
+
+def test_another_build_of_the_contact_model_is_audited_anew(own_cache: Path) -> None:
+    """A failed audit is of a binary and a build: another one is not refused, and has an outcome of its own."""
+    engine, case = find_engine(), make_case(run=SHORT)
+    failed = {"passed": False, "lines": 80, "failures": ["Hertz force"], "date": "2026-01-01T00:00:00Z"}
+    write_audit(engine.sha256, {"contact_model": "0" * 64, **failed})
+    assert _audit_of(run(case, own_cache / "runs")) is None
+    record([Line("right", 1.0, 1.0, 0.1)], engine, "3.8.0")
+    assert _audit_of(run(case, own_cache / "audited"))["passed"]
+    write_audit(engine.sha256, {"contact_model": binary.model_sha256(engine), **failed})
+    with pytest.raises(AuditFailed, match="Hertz force"):
+        run(case, own_cache / "refused")

@@ -33,11 +33,11 @@ from walkers.postprocess.show.report.run import report_run, result_html
 from walkers.postprocess.show.series import render_series
 from walkers.progress import Progress, in_notebook, progress_of
 from walkers.runner import directory as on_disk
-from walkers.runner.binary import find_engine
+from walkers.runner.binary import check_audit, find_engine
 from walkers.runner.failures import RunBusy
 from walkers.runs.by_hand import as_run, take_in
 from walkers.runs.comparison import Comparison, Side, compare_runs
-from walkers.runs.making import check_audit, make_runs, progress_at
+from walkers.runs.making import make_runs, progress_at
 from walkers.runs.names import Changes, Given, Reference, find, is_begun, not_a_run, readable_case, refusing
 from walkers.runs.status import state_at, worst_status
 from walkers.sweeps import table as of_points
@@ -282,13 +282,20 @@ class Run:
         figures = figures_of_spread(self.finished_directory)
         return report_run(self.finished_directory, _path(to), self.origins, figures=figures)
 
-    def spread(self, points: int = 32, *, progress: bool | None = None, **how: Any) -> Spread:
+    def spread(self, points: int = 32, *, progress: bool | None = None, engine: str | None = None) -> Spread:
         """Run the case with uncertain values drawn from their ranges; see `walkers.sweeps.spread.run_spread`."""
-        case, options = self.requested or self.case, Options()
+        case = self.requested or self.case
         with progress_of(f"{case.name}, spread", progress) as advance:
-            return run_spread(case, self.directory.parent, options, points=points, on_progress=advance, **how)
+            return run_spread(
+                case,
+                self.directory.parent,
+                Options(),
+                points=points,
+                engine=engine,
+                on_progress=advance,
+            )
 
-    def accuracy(self, *, progress: bool | None = None, **how: Any) -> dict[str, Any]:
+    def accuracy(self, *, progress: bool | None = None, engine: str | None = None) -> dict[str, Any]:
         """Measure the numerical errors, for the result; see `walkers.sweeps.accuracy.measure_accuracy`.
 
         Examples
@@ -298,7 +305,7 @@ class Run:
         0.002
         """
         with progress_of(f"{self.case.name}, accuracy", progress) as advance:
-            return measure_accuracy(self.finished_directory, Options(), on_progress=advance, **how)
+            return measure_accuracy(self.finished_directory, Options(), engine=engine, on_progress=advance)
 
     def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
         """Write the run for other programs; the functions of `EXPORTS` take the options, such as ``every``.
@@ -344,7 +351,6 @@ def run(
     force: bool = False,
     progress: bool | None = None,
     time_limit: float | None = None,
-    allow_failed_audit: bool = False,
 ) -> Run:
     """Run a case unless a finished run exists. An interrupted run continues; a deck run by hand becomes a run.
 
@@ -357,8 +363,8 @@ def run(
         deck that was run by hand.
     out
         Folder of the run directories.
-    engine, allow_failed_audit
-        Name or path of the binary (`walkers.runner.binary.find_engine`), also if it failed ``walkers check engine``.
+    engine
+        Name or path of the binary (`walkers.runner.binary.find_engine`).
     force
         Run again. The old run is replaced when the new one is finished.
     progress
@@ -385,7 +391,7 @@ def run(
     place = on_disk.run_place(case, binary, out)
     if on_disk.is_finished(place) and not force:
         return _measured(Run(place, requested=case))
-    check_audit(binary, allow_failed_audit)
+    check_audit(binary)
     with progress_of(case.name, progress) as advance:
         runs = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
     if not runs:
@@ -512,7 +518,7 @@ def sweep(
     executor: Executor | None = None,
     time_limit: float | None = None,
     spread: int = 0,
-    **how: Any,
+    engine: str | None = None,
 ) -> Sweep:
     """Run the missing points of a sweep on this machine or a cluster; the ``status`` in its table marks failed points.
 
@@ -535,8 +541,8 @@ def sweep(
     spread
         Number of runs of each finished point with its uncertain values drawn from their ranges, for bands along the
         sweep (columns such as ``velocity_low``); 0: none.
-    out, progress, how
-        See `run`; ``how`` are ``engine`` and ``allow_failed_audit``.
+    out, progress, engine
+        See `run`.
 
     Examples
     --------
@@ -547,12 +553,13 @@ def sweep(
     options = Options(jobs, load_site(Path(site)) if site else None, executor, time_limit)
     folder = Path(out).resolve() if site else Path(out)
     with progress_of(points.name, progress) as advance:
-        record, failures = run_sweep(points, folder, options, on_progress=advance, **how)
+        record, failures = run_sweep(points, folder, options, engine=engine, on_progress=advance)
     failed = {failure.point for failure in failures}
     for number, case in enumerate(points.cases(), 1) if spread else ():
         if number - 1 not in failed:
             with progress_of(f"{points.name}, spread {number} of {len(points.rows)}", progress) as advance:
-                failures += run_spread(case, folder, options, points=spread, on_progress=advance, **how).failures
+                drawn = run_spread(case, folder, options, points=spread, engine=engine, on_progress=advance)
+            failures += drawn.failures
     return Sweep(record.directory, tuple(failures))
 
 
@@ -633,7 +640,7 @@ def calibrate(
     *,
     jobs: int | None = None,
     progress: bool | None = None,
-    **how: Any,
+    engine: str | None = None,
 ) -> Outcome:
     """Calibrate unknown parameters to facts; an interrupted calibration continues. Arguments: see `sweep`.
 
@@ -642,7 +649,9 @@ def calibrate(
     from walkers.calibration import calibrate
     from walkers.calibration.file import load_calibration
 
-    return calibrate.calibrate(load_calibration(calibration), Path(out), Options(jobs), progress=progress, **how)
+    return calibrate.calibrate(
+        load_calibration(calibration), Path(out), Options(jobs), progress=progress, engine=engine
+    )
 
 
 def predict(case: Given, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> dict[str, Any]:

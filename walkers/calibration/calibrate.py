@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -62,12 +61,17 @@ class Outcome:
 
 
 def calibrate(
-    calibration: Calibration, out: Path, options: Options, *, progress: bool | None = False, **how: Any
+    calibration: Calibration,
+    out: Path,
+    options: Options,
+    *,
+    progress: bool | None = False,
+    engine: str | None = None,
 ) -> Outcome:
     """Start or continue a calibration; finished runs are not repeated. Runs that are made keep no dumps.
 
     Three sweeps in the folder ``out``: ``NAME-named``, the sets of the file; ``NAME-round``, a Sobol sequence of sets
-    without the costly experiments; and ``NAME-proposed``. ``options`` and ``how`` are as for
+    without the costly experiments; and ``NAME-proposed``. ``options`` and ``engine`` are as for
     `walkers.sweeps.scheduler.run_sweep`. `InputError` if a key of the file cannot be used, or a range exceeds that of
     its key; `CalibrationStopped` if points are missing for reasons other than their parameters.
     """
@@ -82,7 +86,7 @@ def calibrate(
     def run(part: str, unit: FloatArray, experiments: Sequence[str] = ()) -> FloatArray:
         sweep = calibration.sweep(f"{calibration.name}-{part}", calibration.values(unit), experiments)
         with progress_of(sweep.name, progress) as advance:
-            record, failed = run_sweep(sweep, out, kept, on_progress=advance, **how)
+            record, failed = run_sweep(sweep, out, kept, engine=engine, on_progress=advance)
         failures.update({sweep.name: failed} if failed else {})
         return _numbers(calibration, experiments or [*calibration.experiments], record.directory, failed)
 

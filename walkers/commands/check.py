@@ -14,7 +14,6 @@ import walkers
 from walkers import DEFAULT_OUT
 from walkers.commands.options import (
     At,
-    By,
     Case,
     Engine,
     Formats,
@@ -104,7 +103,7 @@ def case(
     without: Annotated[list[str] | None, Parameter(metavar="TERM")] = None,
     seeds: Annotated[int, Parameter(validator=Number(gte=1))] = 1,
     as_json: Json = False,
-    by: By = By(),
+    engine: Engine = None,
 ) -> int:
     """Run CASE with LIGGGHTS and with an independent second engine in Python, and compare the motion.
 
@@ -129,7 +128,7 @@ def case(
         loaded = loaded if cycles is None else shortened(loaded, cycles)
     except ValueError as error:
         raise refused("--cycles", str(error)) from error
-    lines = crosscheck(loaded, at.out, without or (), seeds=seeds, progress=True, **vars(by))
+    lines = crosscheck(loaded, at.out, without or (), seeds=seeds, progress=True, engine=engine)
     return _print_checked(lines, as_json, case=loaded.name, without=without or [])
 
 
@@ -155,7 +154,7 @@ def figures(
     only: list[str] | None = None,
     formats: Formats = None,
     jobs: Jobs = None,
-    by: By = By(),
+    engine: Engine = None,
 ) -> int:
     """Draw the paper's figures with our results, and write a table of its facts. Missing runs are made first.
 
@@ -169,7 +168,9 @@ def figures(
     from walkers.paper.make import FORMATS, make_figures
     from walkers.sweeps.scheduler import Options
 
-    drawn = make_figures(out, to, Options(jobs), only=only or (), formats=formats or FORMATS, progress=True, **vars(by))
+    drawn = make_figures(
+        out, to, Options(jobs), only=only or (), formats=formats or FORMATS, progress=True, engine=engine
+    )
     for name, failures in drawn.failures.items():
         tell(*(f"{name}: point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
     tell(*(f"{figure} is left out: {reason}" for figure, reason in drawn.left_out.items()))
@@ -184,7 +185,7 @@ def calibrate(
     *,
     out: Out = DEFAULT_OUT,
     jobs: Jobs = None,
-    by: By = By(),
+    engine: Engine = None,
 ) -> int:
     """Calibrate unknown parameters to measured or published values. An interrupted calibration continues.
 
@@ -196,7 +197,7 @@ def calibrate(
     from walkers.calibration.report import RECORD_NAME, summary, write_outcome
     from walkers.files import read_json
 
-    outcome = walkers.calibrate(calibration, out, jobs=jobs, progress=True, **vars(by))
+    outcome = walkers.calibrate(calibration, out, jobs=jobs, progress=True, engine=engine)
     tell(*(f"{name}: {len(failures)} points failed" for name, failures in outcome.failures.items()))
     files = write_outcome(outcome, out / outcome.calibration.name)
     print(summary(read_json(out / outcome.calibration.name / RECORD_NAME)))

@@ -97,21 +97,6 @@ def _check_engine(_: object, name: str | None) -> None:
 Engine = Annotated[str | None, Parameter(validator=_check_engine, help="Name or path of the liggghts binary.")]
 
 
-@Parameter(name="*")
-@dataclass(frozen=True)
-class By:
-    """The engine that runs cases.
-
-    Parameters
-    ----------
-    allow_failed_audit
-        Use an engine that failed walkers check engine.
-    """
-
-    engine: Engine = None
-    allow_failed_audit: bool = False
-
-
 def refuse(option: str, wrong: bool, why: str) -> None:
     """Raise an `InputError` with the reason if an option is ``wrong``."""
     if wrong:

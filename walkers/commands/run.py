@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 import walkers
-from walkers.commands.options import NOT_NEGATIVE, At, By, Case, Jobs, Json, print_as, print_lines, refuse, tell
+from walkers.commands.options import NOT_NEGATIVE, At, Case, Engine, Jobs, Json, print_as, print_lines, refuse, tell
 from walkers.errors import apply_all
 from walkers.progress import progress_of
 from walkers.rounding import duration_text
@@ -79,7 +79,7 @@ def run(
     spread: bool = False,
     points: int | None = None,
     accuracy: bool = False,
-    by: By = By(),
+    engine: Engine = None,
 ) -> int:
     """Run cases and print the results. A finished run is only printed, an interrupted run continues.
 
@@ -113,20 +113,20 @@ def run(
         apply_all(times_of, loaded)
     if spread:
         for case in loaded:
-            list(spread_sweep(case, draws, by.engine).cases())  # also an unusable range
+            list(spread_sweep(case, draws, engine).cases())  # also an unusable range
     failed = False
     for reference, case, earlier in zip(named, loaded, finished, strict=True):
         folder = reference.folder
         tell(*(f"{case.name}: {note}" for note in notes(case) if earlier is None))
         try:
-            done = earlier or walkers.run(case, folder, force=force, progress=True, time_limit=limit, **vars(by))
+            done = earlier or walkers.run(case, folder, engine=engine, force=force, progress=True, time_limit=limit)
         except EngineFailure as failure:
             tell(f"{case.name}: {failure}")
             failed = True
             continue
         if accuracy:
-            done.accuracy(progress=True, **vars(by))
-        band = done.spread(draws, progress=True, **vars(by)) if spread else None
+            done.accuracy(progress=True, engine=engine)
+        band = done.spread(draws, progress=True, engine=engine) if spread else None
         failed |= bool(band and band.failures)
         if as_json:
             ranges = {"spread": band.as_dict()} if band else {}
@@ -147,7 +147,7 @@ def sweep(
     limit: Annotated[float | None, Parameter(validator=NOT_NEGATIVE)] = None,
     spread: bool = False,
     points: int | None = None,
-    by: By = By(),
+    engine: Engine = None,
 ) -> int:
     """Run the missing points of a sweep on all cores or on a cluster. Exit status 1 if a point fails.
 
@@ -181,16 +181,25 @@ def sweep(
     if dry_run:
         options = Options(jobs, load_site(site) if site else None)
         with progress_of(loaded.name) as advance:
-            plan = plan_sweep(loaded, at.out, options, by.engine, advance)
+            plan = plan_sweep(loaded, at.out, options, engine, advance)
         print(plan.as_text())
         if spread:
-            sweeps = (spread_sweep(case, draws, by.engine) for case in loaded.cases())
-            plans = [plan_sweep(drawn, at.out, options, by.engine) for drawn in sweeps]
+            sweeps = (spread_sweep(case, draws, engine) for case in loaded.cases())
+            plans = [plan_sweep(drawn, at.out, options, engine) for drawn in sweeps]
             seconds, more = (sum(plan.core_seconds for plan in plans), sum(len(plan.missing) for plan in plans))
             print(f"  spread     {more} more runs, predicted {seconds:.0f} core-seconds")
         return 0
-    how = {"jobs": jobs, "site": site, "time_limit": limit, "spread": draws, **vars(by)}
-    done = walkers.sweep(sweep, at.out, changes=at.values, progress=True, **how)
+    done = walkers.sweep(
+        sweep,
+        at.out,
+        jobs=jobs,
+        changes=at.values,
+        progress=True,
+        site=site,
+        time_limit=limit,
+        spread=draws,
+        engine=engine,
+    )
     tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in done.failures))
     print(f"{done.summary()}\n  table      walkers list {done.directory}")
     origins = next(loaded.cases()).origins  # the table has the values of varied keys

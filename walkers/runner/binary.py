@@ -16,6 +16,7 @@ import shlex
 import shutil
 import subprocess
 import tempfile
+import warnings
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -33,7 +34,15 @@ from walkers.cache import (
     secure_cache,
 )
 from walkers.files import checksum, read_json, write_json
-from walkers.runner.failures import AUDITED_VERSION, ContactModelMissing, EngineFailure, EngineMissing, OtherEngine
+from walkers.runner.failures import (
+    AUDITED_VERSION,
+    AuditFailed,
+    ContactModelMissing,
+    EngineFailure,
+    EngineMissing,
+    OtherEngine,
+    UnauditedEngineWarning,
+)
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, RUN_NAME
 
 ENGINE_VARIABLE = "WALKERS_ENGINE"
@@ -232,6 +241,49 @@ def compile_model() -> None:
 # --- audits -----------------------------------------------------------------------------------------------------------
 
 
+def check_audit(engine: Engine) -> None:
+    """Refuse an engine whose audit failed, and warn of one without an audit.
+
+    An audit is of a binary and of a build of the contact model. Another binary or another build has none until
+    ``walkers check engine`` audits it.
+
+    Parameters
+    ----------
+    engine
+        The engine that is to run a deck.
+
+    Raises
+    ------
+    AuditFailed
+        If a force of this engine with its contact model was not as expected.
+
+    Warns
+    -----
+    UnauditedEngineWarning
+        If the engine was never audited with its contact model; once in a process.
+    """
+    audit = read_audit(engine.sha256, model_sha256(engine))
+    if audit is None:
+        _warn_unaudited(engine)
+    elif not audit["passed"]:
+        failures = audit["failures"]
+        raise AuditFailed(
+            f"{engine.path} failed its audit in {len(failures)} line(s), first: {failures[0]}; to see them and to "
+            f"audit it again: walkers check engine --engine {shlex.quote(str(engine.path))}; to run, install Debian's "
+            f"package liggghts again, or name another binary by --engine or {ENGINE_VARIABLE}"
+        )
+
+
+@lru_cache(maxsize=8)
+def _warn_unaudited(engine: Engine) -> None:
+    """Warn of an engine without an audit. The cache makes this once in a process."""
+    warnings.warn(
+        f"{engine.path} was never audited with its contact model: walkers check engine",
+        UnauditedEngineWarning,
+        stacklevel=4,
+    )
+
+
 def read_audit(engine: str, model: str | None) -> dict[str, Any] | None:
     """Outcome of the audit of a binary, by its hash; None without one with this contact model (its hash; None: any)."""
     path = cache_folder() / "audits" / f"{engine}.json"
@@ -242,15 +294,6 @@ def read_audit(engine: str, model: str | None) -> dict[str, Any] | None:
         if model in (None, record["contact_model"]):
             return {name: record[name] for name in ("passed", "lines", "failures", "date")}
     return None
-
-
-def is_new(engine: str, model: str | None) -> bool:
-    """Whether this is the first call for a binary and a contact model with this user's cache."""
-    try:
-        (make_cache_folder("audits") / f"{engine}.{model}.seen").open("x").close()
-    except OSError as error:  # in a cache that cannot be written it is new each time
-        return not isinstance(error, FileExistsError)
-    return True
 
 
 def write_audit(engine: str, record: Mapping[str, Any]) -> None:

@@ -14,7 +14,6 @@ import os
 import re
 import shutil
 import time
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -29,8 +28,8 @@ from walkers.postprocess.measure.results import measure
 from walkers.progress import Progress, Tell
 from walkers.rounding import duration_text
 from walkers.runner import directory as on_disk
-from walkers.runner.binary import Engine, is_new, model_sha256, read_audit
-from walkers.runner.failures import AuditFailed, BeadsOverTheTop, UnauditedEngineWarning
+from walkers.runner.binary import Engine
+from walkers.runner.failures import BeadsOverTheTop
 from walkers.runner.launch import EngineReport, check_room, last_step, launch
 from walkers.runner.manifest import write_manifest
 from walkers.templates import deck as decks
@@ -51,20 +50,6 @@ class DamagedSegment(WalkersError):
 
 class BridgeTablesDiffer(WalkersError):
     """The complete segments of an unfinished run have other bridge tables than the next one would have."""
-
-
-def check_audit(engine: Engine, allow_failed_audit: bool) -> None:
-    """Refuse an engine whose audit failed (`AuditFailed`), unless allowed; warn once of an engine without audit."""
-    model = model_sha256(engine)
-    audit = read_audit(engine.sha256, model)
-    if audit is None and is_new(engine.sha256, model):
-        message = "this engine was never audited with its contact model: walkers check engine (shown once)"
-        warnings.warn(message, UnauditedEngineWarning, stacklevel=3)
-    elif audit is not None and not audit["passed"] and not allow_failed_audit:
-        raise AuditFailed(
-            f"this engine failed its audit in {len(audit['failures'])} line(s), first: {audit['failures'][0]}; "
-            "for details: walkers check engine (--allow-failed-audit, in Python allow_failed_audit=True, runs anyway)"
-        )
 
 
 def make_runs(

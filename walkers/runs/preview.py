@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import asdict
-from math import acos, ceil, degrees, inf, isfinite
+from math import acos, degrees, isfinite
 from typing import Any
 
 from walkers.inputs.resolving.library import library_of

@@ -10,7 +10,6 @@ from dataclasses import replace
 from itertools import pairwise
 from math import degrees, inf, sqrt
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial.distance import pdist
@@ -50,10 +49,18 @@ def courses(first: Motion, second: Motion) -> Iterator[Line]:
     yield Line(f"{name}largest distance of a bead", 0.0, 1e6 * float(apart.max()), unit="µm")
 
 
-def crosscheck(case: Case, out: Path, without: Collection[str] = (), *, seeds: int = 1, **how: Any) -> list[Line]:
+def crosscheck(
+    case: Case,
+    out: Path,
+    without: Collection[str] = (),
+    *,
+    seeds: int = 1,
+    progress: bool | None = None,
+    engine: str | None = None,
+) -> list[Line]:
     """Compare the run of a case with the second engine ``without`` some terms; for a pile, runs with several seeds.
 
-    ``how`` are options of `walkers.run`.
+    ``progress`` and ``engine`` are as for `walkers.run`.
 
     Examples
     --------
@@ -61,7 +68,8 @@ def crosscheck(case: Case, out: Path, without: Collection[str] = (), *, seeds: i
     []
     """
     cases = [case.changed({"run.seed": case.run.seed + number} if number else {}) for number in range(seeds)]
-    return compare([run(start, out, **how).motion for start in cases], without)
+    motions = [run(start, out, progress=progress, engine=engine).motion for start in cases]
+    return compare(motions, without)
 
 
 def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Line]:

@@ -20,6 +20,7 @@ from walkers.inputs.tables.case import STIFFEST, Case
 from walkers.postprocess.measure.results import recorded
 from walkers.postprocess.measure.sides import STEADY_SPEED
 from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME
+from walkers.progress import Tell
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import case_of, recomputed, run_place
 from walkers.sweeps.scheduler import Options, SweepStopped, run_sweep
@@ -38,7 +39,13 @@ _FAMILIES = ("velocity", "right_facing", "left_facing", "axial_", "lateral_", "r
 """Beginnings of the names of numbers that have a numerical error, all in m/s."""
 
 
-def measure_accuracy(directory: Path, options: Options, *, engine: str | None = None, **how: Any) -> dict[str, Any]:
+def measure_accuracy(
+    directory: Path,
+    options: Options,
+    *,
+    engine: str | None = None,
+    on_progress: Tell | None = None,
+) -> dict[str, Any]:
     """Make the runs that measure the numerical errors of a finished run, and record the errors in the run.
 
     Finished runs are used again. Other arguments: see `walkers.sweeps.scheduler.run_sweep`. `InputError` if the run is
@@ -61,7 +68,7 @@ def measure_accuracy(directory: Path, options: Options, *, engine: str | None = 
     numbers = recorded(directory)["numbers"]
     for last in range(min(2, len(possible) - 1), len(possible)):
         sweep = _sweep(case, f"{directory.name}{ACCURACY}", possible[: last + 1])
-        record, failures = run_sweep(sweep, directory.parent, options, engine=engine, **how)
+        record, failures = run_sweep(sweep, directory.parent, options, engine=engine, on_progress=on_progress)
         if failures:
             raise SweepStopped(f"{failures[0].run}: {failures[0].message}")
         table = load(record.directory)

@@ -36,12 +36,12 @@ from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.results import ensure_measured
 from walkers.progress import Progress, Tell
 from walkers.rounding import counted, duration_text
-from walkers.runner.binary import Engine, find_engine
+from walkers.runner.binary import Engine, check_audit, find_engine
 from walkers.runner.cost import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
 from walkers.runner.directory import is_finished, is_locked, run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
 from walkers.runner.launch import cores_here
-from walkers.runs.making import check_audit, make_runs, progress_at
+from walkers.runs.making import make_runs, progress_at
 from walkers.runs.status import PointState, status_text
 from walkers.sweeps.record import RECORD_NAME, UNREADABLE, SweepRecord, read_record, states, write_record
 from walkers.sweeps.site import check_path, decks_at, prepare
@@ -316,7 +316,6 @@ def run_sweep(
     options: Options,
     *,
     engine: str | None = None,
-    allow_failed_audit: bool = False,
     on_progress: Tell | None = None,
 ) -> tuple[SweepRecord, list[Failure]]:
     """Make the missing runs of a sweep, and return its record and the failed points.
@@ -328,7 +327,7 @@ def run_sweep(
     plan = plan_sweep(sweep, out, options, engine, on_progress)
     record = plan.record
     if plan.decks:
-        check_audit(plan.engine, allow_failed_audit)
+        check_audit(plan.engine)
     with suppress(InputError):  # no sweep of this name, or none that can be read
         if not set(read_record(record.directory).runs) & set(record.runs):
             text = "replaces a sweep of the same name without common runs; figures and reports there show the old one"

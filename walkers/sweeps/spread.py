@@ -22,6 +22,7 @@ from walkers.postprocess.measure.quantities import declared, unit_shown
 from walkers.postprocess.measure.results import read
 from walkers.postprocess.measure.sides import REST
 from walkers.postprocess.measure.uncertainty import SPREAD_NAME, few_draws, held_of, held_text, in_lines, spread_of
+from walkers.progress import Tell
 from walkers.rounding import counted, rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
@@ -125,7 +126,13 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
 
 
 def run_spread(
-    case: Case, out: Path, options: Options, *, points: int = POINTS, engine: str | None = None, **how: Any
+    case: Case,
+    out: Path,
+    options: Options,
+    *,
+    points: int = POINTS,
+    engine: str | None = None,
+    on_progress: Tell | None = None,
 ) -> Spread:
     """Run a case with all unmeasured values drawn from their ranges, and write the bands beside the sweep's record.
 
@@ -138,7 +145,8 @@ def run_spread(
     band is wider than that of the posterior.
     """
     options = replace(options, dumps=False)
-    record, failures = run_sweep(spread_sweep(case, points, engine), out, options, engine=engine, **how)
+    draws = spread_sweep(case, points, engine)
+    record, failures = run_sweep(draws, out, options, engine=engine, on_progress=on_progress)
     table = load(record.directory)
     warned = [read(run).warnings for run in table.loc[table["status"] == "finished", "run"]]
     spread = replace(spread_in(table, case, record.directory, failures), doubts=[*filter(None, warned)])
