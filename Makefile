@@ -116,7 +116,7 @@ extras: setup .venv/with-all ## Install what reports, archives, calibrations, th
 setup: engine .venv/ready ## Install what is missing: liggghts and what compiles its contact model (apt-get), and .venv
 	@# Where PYTHONDONTWRITEBYTECODE is set, each command would compile what it imports: half of its time.
 	@.venv/bin/python -m compileall -q walkers
-	@.venv/bin/python -c "from walkers.runner.binary import compile_model; compile_model()"
+	@.venv/bin/python -c "from walkers.runner.compiled_model import compile_model; compile_model()"
 
 # Debian packages of targets, and the commands and files without which they are installed.
 # The engine, what its contact model is compiled with, and Mesa, by which pictures are drawn without a screen.

@@ -20,7 +20,8 @@ from statistics import median
 import walkers
 from walkers.inputs.reading import load_case
 from walkers.inputs.tables.case import Case
-from walkers.runner.binary import find_engine, plugin_of
+from walkers.runner.binary import find_engine
+from walkers.runner.compiled_model import plugin_of
 from walkers.runner.directory import write_deck
 from walkers.runner.launch import ALONE
 from walkers.templates import deck as deck_module

@@ -22,9 +22,9 @@ from walkers.archive.crate import PAPER, Author, describe_crate
 from walkers.archive.writing import Contents, contents_of, write_archive
 from walkers.files import write_json
 from walkers.inputs.tables.case import Case
-from walkers.runner.binary import model_version
 from walkers.runner.directory import leave_out_dumps
 from walkers.runner.manifest import FileChanged, read_manifest
+from walkers.runner.model_sources import model_version
 from walkers.runner.provenance import software
 from walkers.sweeps.table import load
 

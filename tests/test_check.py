@@ -29,10 +29,13 @@ from walkers.physics.contact import hertz_overlap, reduced_modulus
 from walkers.physics.laws import by_name
 from walkers.postprocess.measure.dump import local_frames
 from walkers.postprocess.measure.motion import Motion, read_motion
-from walkers.runner import binary
-from walkers.runner.binary import SOURCES, find_engine, read_audit, write_audit
+from walkers.runner import audit, model_sources
+from walkers.runner.audit import read_audit, write_audit
+from walkers.runner.binary import find_engine
+from walkers.runner.compiled_model import model_sha256, plugin_of
 from walkers.runner.failures import AuditFailed, EngineError, UnauditedEngineWarning
 from walkers.runner.manifest import read_manifest
+from walkers.runner.model_sources import SOURCES
 from walkers.second_engine import kernels
 from walkers.second_engine.audit import CHECKS, record, run_audit
 from walkers.second_engine.crosscheck import compare, full_cases, shortened, simulate
@@ -303,7 +306,7 @@ def test_liquid_is_conserved_by_two_ranks(bench: Bench) -> None:
 @pytest.fixture
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A user's cache of the test's own, with the contact model that is compiled already."""
-    kept = binary.plugin_of(find_engine())
+    kept = plugin_of(find_engine())
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "cache" / "granular-walkers").mkdir(parents=True)
     for part in (kept, kept.with_suffix(".json")):
@@ -336,7 +339,7 @@ def test_a_machine_without_wide_instructions_gives_the_same_bytes(
     text = (SOURCES / "forces.h").read_text()
     assert text.count(clones) == 1
     (sources / "forces.h").write_text(text.replace(clones, ""))
-    monkeypatch.setattr(binary, "SOURCES", sources)
+    monkeypatch.setattr(model_sources, "SOURCES", sources)
     narrow = run(case, own_cache / "narrow").motion
     for name in ("position", "velocity", "spin"):
         assert np.array_equal(getattr(wide, name), getattr(narrow, name)), name
@@ -378,7 +381,7 @@ def test_an_engine_without_an_audit_is_warned_of_once_in_a_process(
     own_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Nothing of it stays in the cache: the next process warns again."""
-    binary._warn_unaudited.cache_clear()
+    audit._warn_unaudited.cache_clear()
     with pytest.warns(UnauditedEngineWarning, match="never audited .*: walkers check engine"):
         run(make_case(run=SHORT), own_cache / "runs")
     with warnings.catch_warnings():
@@ -419,6 +422,6 @@ def test_another_build_of_the_contact_model_is_audited_anew(own_cache: Path) -> 
     assert _audit_of(run(case, own_cache / "runs")) is None
     record([Line("right", 1.0, 1.0, 0.1)], engine, "3.8.0")
     assert _audit_of(run(case, own_cache / "audited"))["passed"]
-    write_audit(engine.sha256, {"contact_model": binary.model_sha256(engine), **failed})
+    write_audit(engine.sha256, {"contact_model": model_sha256(engine), **failed})
     with pytest.raises(AuditFailed, match="Hertz force"):
         run(case, own_cache / "refused")

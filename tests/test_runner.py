@@ -40,8 +40,9 @@ from walkers import run as run_case
 from walkers.cache import is_trusted
 from walkers.inputs.tables.case import Case
 from walkers.physics.laws import young_laplace
-from walkers.runner import binary, directory, failures
-from walkers.runner.binary import find_engine, plugin_of
+from walkers.runner import audit, directory, failures, model_sources
+from walkers.runner.binary import find_engine
+from walkers.runner.compiled_model import plugin_of
 from walkers.runner.directory import (
     FIRST_SEGMENT,
     case_of,
@@ -248,9 +249,9 @@ def test_a_contact_model_that_may_not_be_the_compiled_is_compiled_anew(
     if os.geteuid():
         pytest.skip("only root can give files away")
     (sources := tmp_path / "engine").mkdir()
-    shutil.copy(binary.SOURCES / "bridge.map", sources)
+    shutil.copy(model_sources.SOURCES / "bridge.map", sources)
     (sources / "bridge.cpp").write_text("// FORCES_VERSION 1\nint small = 1;\n")
-    monkeypatch.setattr(binary, "SOURCES", sources)
+    monkeypatch.setattr(model_sources, "SOURCES", sources)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     model = plugin_of(find_engine())
     right, before = model.read_bytes(), model.stat().st_mtime_ns
@@ -334,25 +335,25 @@ def test_capillary_forces_that_another_user_wrote_are_not_believed(name: str, em
 @pytest.mark.parametrize("name", PLANTED)
 def test_audits_that_another_user_wrote_are_not_believed(name: str, empty_cache: Path) -> None:
     passed = {"passed": True, "lines": 80, "failures": [], "date": "2026-01-01T00:00:00Z"}
-    binary.write_audit("engine", {"contact_model": "0" * 64, **passed})
-    assert binary.read_audit("engine", None) == passed
+    audit.write_audit("engine", {"contact_model": "0" * 64, **passed})
+    assert audit.read_audit("engine", None) == passed
     (file,) = empty_cache.glob("audits/*.json")
     PLANTED[name](file)
-    assert binary.read_audit("engine", None) is None
+    assert audit.read_audit("engine", None) is None
 
 
 def test_an_audit_is_kept_whatever_files_others_of_the_group_may_write(empty_cache: Path) -> None:
     before = os.umask(0o002)
     try:
-        binary.write_audit("engine", {"contact_model": "0", "passed": True, "lines": 1, "failures": [], "date": ""})
+        audit.write_audit("engine", {"contact_model": "0", "passed": True, "lines": 1, "failures": [], "date": ""})
     finally:
         os.umask(before)
-    assert binary.read_audit("engine", "0") is not None
+    assert audit.read_audit("engine", "0") is not None
 
 
 def test_another_version_of_the_forces_is_another_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    shutil.copytree(binary.SOURCES, tmp_path / "engine")
-    monkeypatch.setattr(binary, "SOURCES", tmp_path / "engine")
+    shutil.copytree(model_sources.SOURCES, tmp_path / "engine")
+    monkeypatch.setattr(model_sources, "SOURCES", tmp_path / "engine")
     before, source = find_engine(), tmp_path / "engine" / "bridge.cpp"
     text = source.read_text()
     for changed, same in ((f"{text}// another line\n", True), (re.sub(r"(FORCES_VERSION) \d+", r"\1 0", text), False)):

@@ -33,7 +33,8 @@ from walkers.postprocess.show.report.run import report_run, result_html
 from walkers.postprocess.show.series import render_series
 from walkers.progress import Progress, in_notebook, progress_of
 from walkers.runner import directory as on_disk
-from walkers.runner.binary import check_audit, find_engine
+from walkers.runner.audit import check_audit
+from walkers.runner.binary import find_engine
 from walkers.runner.failures import RunBusy
 from walkers.runs.by_hand import as_run, take_in
 from walkers.runs.comparison import Comparison, Side, compare_runs

@@ -22,9 +22,10 @@ from walkers.extras import require
 from walkers.files import beside, checksum, json_bytes, open_regular
 from walkers.inputs.toml import toml_bytes
 from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME, SPREAD, SPREAD_NAME
-from walkers.runner.binary import build_script, model_sources, model_version
+from walkers.runner.compiled_model import build_script
 from walkers.runner.directory import CASE_NAME, case_of, name_of
 from walkers.runner.manifest import MANIFEST_NAME, FileChanged, read_manifest
+from walkers.runner.model_sources import model_sources, model_version
 from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_record, states
 from walkers.text import printable, rendered
 

@@ -19,7 +19,8 @@ from pathlib import Path
 
 from walkers.files import open_regular, read_regular
 from walkers.runner import failures
-from walkers.runner.binary import Engine, plugin_of, version_in, write_run_script
+from walkers.runner.binary import Engine, version_in
+from walkers.runner.compiled_model import plugin_of, write_run_script
 from walkers.runner.failures import AUDITED_VERSION
 from walkers.templates.deck import DECK_NAME, OUTPUT_NAME, Deck
 

@@ -11,8 +11,11 @@ from typing import Any
 from walkers.errors import WalkersError
 from walkers.files import checksum, read_json, write_json
 from walkers.inputs.tables.case import Case
-from walkers.runner.binary import Engine, model_version, plugin_of, read_audit
+from walkers.runner.audit import read_audit
+from walkers.runner.binary import Engine
+from walkers.runner.compiled_model import plugin_of
 from walkers.runner.launch import EngineReport
+from walkers.runner.model_sources import model_version
 from walkers.runner.provenance import software
 from walkers.templates.deck import CONTENT_VERSION, bridge_tables_digest
 

@@ -25,7 +25,8 @@ from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.results import measure
 from walkers.rounding import percent
 from walkers.runner import directory as on_disk
-from walkers.runner.binary import find_engine, plugin_of, write_run_script
+from walkers.runner.binary import find_engine
+from walkers.runner.compiled_model import plugin_of, write_run_script
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.launch import judge
 from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest, write_manifest

@@ -8,7 +8,9 @@ from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from walkers.runner.binary import Engine, find_engine, model_sha256, write_audit
+from walkers.runner.audit import write_audit
+from walkers.runner.binary import Engine, find_engine
+from walkers.runner.compiled_model import model_sha256
 from walkers.runner.manifest import iso_time
 from walkers.second_engine.lines import Line, Verdict, failures, run_checks
 from walkers.second_engine.scenes import CHECKS, Bench

@@ -36,7 +36,8 @@ from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.results import ensure_measured
 from walkers.progress import Progress, Tell
 from walkers.rounding import counted, duration_text
-from walkers.runner.binary import Engine, check_audit, find_engine
+from walkers.runner.audit import check_audit
+from walkers.runner.binary import Engine, find_engine
 from walkers.runner.cost import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
 from walkers.runner.directory import is_finished, is_locked, run_place, unfinished
 from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers

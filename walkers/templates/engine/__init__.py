@@ -1,1 +1,4 @@
-"""The contact model ``cohesion bridge``, C++ that `walkers.runner.binary` compiles and the engine loads (README.md)."""
+"""The contact model ``cohesion bridge``, C++ that `walkers.runner.compiled_model` compiles.
+
+The engine loads it; README.md describes it.
+"""
