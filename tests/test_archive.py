@@ -18,8 +18,9 @@ from rocrate.rocrate import ROCrate
 import walkers
 from tests.conftest import SHORT, brief_pile, call, document, make_case, to_toml
 from walkers import Run, load_case
+from walkers.archive.contents import Contents, contents_of
 from walkers.archive.crate import PAPER, Author, describe_crate
-from walkers.archive.writing import Contents, contents_of, write_archive
+from walkers.archive.writing import write_archive
 from walkers.files import write_json
 from walkers.inputs.tables.case import Case
 from walkers.runner.directory import leave_out_dumps

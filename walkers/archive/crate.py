@@ -7,15 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import quote
 
+from walkers.archive.contents import METADATA_NAME, Contents, File
 from walkers.runner.provenance import PROJECT
 
-if TYPE_CHECKING:
-    from walkers.archive.writing import Contents, File
-
-METADATA_NAME = "ro-crate-metadata.json"
 CRATE = "https://w3id.org/ro/crate/1.1"
 """Version of RO-Crate that the profile extends."""
 PROFILE = "https://w3id.org/ro/wfrun/process/0.5"

@@ -6,15 +6,13 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from walkers.archive.crate import METADATA_NAME
+from walkers.archive.contents import METADATA_NAME, SUMS_NAME
 from walkers.errors import refused
 from walkers.runner.directory import CASE_NAME, SEGMENTS
 from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest
 from walkers.sweeps.record import RECORD_NAME, read_record, states
 from walkers.text import printable
 
-SUMS_NAME = "sha256sums.txt"
-"""List of checksums in an archive, in the format of ``sha256sum -c``."""
 _READ = (".json", ".parquet", ".txt", ".lig", ".bin")
 """Suffixes of the files of a run that are read again."""
 _HARMLESS = ("made since", "left out")
