@@ -1,8 +1,8 @@
 """What a run is worth later: its manifest, its checksums, and archives that others can read, check and use again."""
 
 import hashlib
-import importlib.resources
-import io
+import json
+import os
 import re
 import shutil
 import subprocess
@@ -13,15 +13,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from rocrate.rocrate import ROCrate
 
 import walkers
-from tests.conftest import SHORT, brief_pile, call, document, make_case, to_toml
+from tests.conftest import PROGRAM, SHORT, brief_pile, call, document, make_case, to_toml
 from walkers import Run, load_case
-from walkers.archive.contents import Contents, contents_of
-from walkers.archive.crate import PAPER, Author, describe_crate
+from walkers.archive.contents import Contents
 from walkers.archive.writing import write_archive
-from walkers.files import write_json
+from walkers.files import read_json, write_json
 from walkers.inputs.tables.case import Case
 from walkers.runner.directory import leave_out_dumps
 from walkers.runner.manifest import FileChanged, read_manifest
@@ -29,9 +27,9 @@ from walkers.runner.model_sources import model_version
 from walkers.runner.provenance import software
 from walkers.sweeps.table import load
 
-AUTHOR = ("--author", "Josiah Carberry", "--orcid", "0000-0002-1825-0097")
-CONTEXT = "https://w3id.org/ro/crate/1.1/context"
-CRATE, SUMS = "ro-crate-metadata.json", "sha256sums.txt"
+AUTHOR = ("--author", "Josiah Carberry", "--licence", "CC-BY-4.0")
+RECORD = "archive.json"
+SUMS = "sha256sums.txt"
 
 
 @pytest.fixture
@@ -51,26 +49,6 @@ def shared(once: Callable[[str, Callable[[Path], object]], Path], tmp_path: Path
         call("sweep", "angles.toml", "-j", "1", check=True, folder=folder)
 
     return Path(shutil.copytree(once("archived-sweep", fill) / "runs", tmp_path / "shared"))
-
-
-def _issues(archive: Path, folder: Path) -> list[str]:
-    """What the validator of RO-Crates finds, without a network: its cache is given the context that rocrate ships."""
-    import requests
-    from requests_cache import CachedSession
-    from rocrate_validator.models import Severity
-    from rocrate_validator.services import ValidationSettings, validate
-    from urllib3 import HTTPResponse
-
-    session = CachedSession(cache_name=str(folder / "http"), backend="sqlite", expire_after=-1)
-    text = (importlib.resources.files("rocrate") / "data" / "ro-crate.jsonld").read_bytes()
-    asked = requests.Request("GET", CONTEXT).prepare()
-    head = {"Content-Type": "application/ld+json"}
-    raw = HTTPResponse(io.BytesIO(text), head, 200, preload_content=False, request_url=CONTEXT)
-    session.cache.save_response(requests.adapters.HTTPAdapter().build_response(asked, raw))
-    session.close()
-    how = {"offline": True, "cache_path": folder / "http", "requirement_severity": Severity.REQUIRED}
-    asked_of = ValidationSettings(rocrate_uri=str(archive), profile_identifier="process-run-crate", **how)
-    return [str(issue.check.name) for issue in validate(asked_of).get_issues()]
 
 
 def _verified(path: Path, status: int = 0) -> list[str]:
@@ -131,33 +109,40 @@ def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
     (there / "result.json").unlink()
     (there / "result.json").symlink_to("nowhere")
     assert _verified(unpacked, 1)[1] == f"  missing    runs/{run.name}/result.json"
-    crate, manifest, place = ROCrate(unpacked), read_manifest(run), f"runs/{run.name}"
-    root = crate.root_dataset
-    assert (root["citation"].id, root["license"].id.rpartition("/")[2]) == (PAPER, "CC-BY-4.0")
-    assert root["datePublished"] == manifest["finished"]
-    assert {name: crate.get(f"{place}/{name}")["sha256"] for name in manifest["sha256"]} == manifest["sha256"]
-    engine, analysis = root["mentions"]
-    assert engine["instrument"]["sha256"] == manifest["engine"]["sha256"]
-    names = {what: {Path(item.id).name for item in engine[what]} for what in ("object", "result")}
-    assert names["object"] >= {"walker.lig", "bridges.txt", "run.sh"}
-    assert names["result"] == {"beads.bin", "bridges.pairs.txt", "bridges.walls.txt", "engine.log", "segment.json"}
-    assert {Path(item.id).name for item in analysis["result"]} >= {"result.json", "trajectory.parquet"}
+    manifest = read_manifest(run)
+    listed = dict(line.split("  ")[::-1] for line in (unpacked / SUMS).read_text().splitlines())
+    assert {name: listed[f"runs/{run.name}/{name}"] for name in manifest["sha256"]} == manifest["sha256"]
+    record = read_json(unpacked / RECORD)
+    assert (record["authors"], record["licence"]) == (["Josiah Carberry"], "CC-BY-4.0")
+    assert (record["name"], record["finished"]) == (run.name, manifest["finished"])
+    about = record["runs"][f"runs/{run.name}"]
+    assert (about["case"], about["made_by"]["commit"]) == ("test", manifest["commit"])
+    assert about["made_by"]["packages"] == manifest["packages"]
+    assert about["engine"] == {name: manifest["engine"][name] for name in ("version", "sha256")}
+    assert about["contact_model"]["sources"] == model_version()["sources"]
+    assert "measured_by" not in about
+    assert str(Path.home()) not in (unpacked / RECORD).read_text(), "no path of this machine"
 
 
 def test_an_archive_has_the_date_of_its_last_run() -> None:
     dates = ("2026-03-01T10:00:00Z", "2026-03-02T09:00:00Z", "2026-02-28T23:00:00Z")
-    assert Contents("three", "", {date: {"finished": date} for date in dates}, {}, []).finished == dates[1]
+    manifests = {date: {"finished": date} for date in dates}
+    assert Contents("three", "", manifests, cases={}, files={}, main=[]).finished == dates[1]
 
 
-def test_the_tables_of_an_archive_are_made_by_the_program_that_made_the_last(shared: Path) -> None:
-    """One run was measured again, by a later version, after both were finished."""
-    contents = contents_of(shared / "angles")
-    last = next(iter(contents.manifests.values()))
-    last["tabulated"] = {**software(), "granular_walkers": "99.0", "commit": None, "date": "2099-01-01T00:00:00Z"}
-    entities = {one["@id"]: one for one in describe_crate(contents, [], "CC0-1.0")["@graph"]}
-    (tables,) = (one for one in entities.values() if one.get("name") == "Tables of angles")
-    assert entities[tables["instrument"]["@id"]]["softwareVersion"] == "99.0"
-    assert tables["endTime"] == "2099-01-01T00:00:00Z"
+def test_the_record_of_an_archive_names_the_programs_that_made_and_measured_a_run(run: Path, tmp_path: Path) -> None:
+    """The run was measured again by a later version. Nothing is said that the user does not say."""
+    later = {**software(), "granular_walkers": "99.0", "commit": None, "date": "2099-01-01T00:00:00Z", "files": []}
+    write_json(run / "manifest.json", {**read_manifest(run), "tabulated": later})
+    with zipfile.ZipFile(write_archive(run, tmp_path / "run.zip")) as packed:
+        record = json.loads(packed.read(RECORD))
+        readme = packed.read("README.md").decode()
+    about = record["runs"][f"runs/{run.name}"]
+    assert about["made_by"]["granular_walkers"] == software()["granular_walkers"]
+    assert (about["measured_by"]["granular_walkers"], about["measured_by"]["date"]) == ("99.0", later["date"])
+    assert (record["authors"], record["licence"]) == ([], None)
+    assert "Licence:" not in readme
+    assert "\nBy " not in readme
 
 
 def test_an_archive_without_dumps(run: Path, tmp_path: Path) -> None:
@@ -179,7 +164,6 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     """Runs that shared a deck come with it, and the table is what it was."""
     archive, unpacked = tmp_path / "sweep.zip", tmp_path / "unpacked"
     call("export", str(shared / "angles"), "--to", "archive", "-o", str(archive), *AUTHOR, check=True)
-    assert _issues(archive, tmp_path) == []
     shutil.unpack_archive(archive, unpacked)
     there = unpacked / "runs" / "angles"
     before, after = (load(folder).drop(columns="run") for folder in (shared / "angles", there))
@@ -189,8 +173,7 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     assert [place.name for place in places] == [Path(place).name for place in load(shared / "angles")["run"]]
     for place, angle in zip(places, ("0 deg", "10 deg"), strict=True):
         assert load_case(place / "base.toml") == Case.read(document(run=SHORT, dimers={"angle": angle}), name="base")
-    actions = [action["name"].split()[0] for action in ROCrate(unpacked).root_dataset["mentions"]]
-    assert actions == ["Simulation", "Simulation", "Tables"]
+    assert list(read_json(unpacked / RECORD)["runs"]) == [f"runs/{place.name}" for place in places]
     assert _verified(there)[0] == "angles: 2 points have a run"
     deck = places[0] / "shared_deck" / "walker.lig"
     deck.write_text(deck.read_text().replace("gravity", "levity"))
@@ -229,7 +212,7 @@ def test_an_archive_that_cannot_be_made_leaves_the_older_one(run: Path, archive:
         ("film.mp4", b"new", 0, "made since film.mp4"),
         ("notes.txt", b"new", 1, "not listed notes.txt"),
         ("result.json", None, 1, "result.json"),
-        (CRATE, None, 1, f"missing    {CRATE}"),
+        (RECORD, None, 1, f"missing    {RECORD}"),
         (SUMS, b"what it is not", 2, "expected a checksum and a path"),
         (SUMS, None, 2, f"or an archive ({SUMS})"),
     ],
@@ -271,6 +254,29 @@ def repeat(built_model: Path) -> Repeat:
     return called
 
 
+def _commands(readme: str, heading: str) -> str:
+    """The commands that a README prints below a heading, but those that install packages, as a shell script."""
+    section = readme.split(f"## {heading}\n")[1].split("\n## ", maxsplit=1)[0]
+    lines = [line.strip() for line in section.splitlines() if line.startswith("    ")]
+    return "\n".join(line for line in lines if not line.startswith("apt-get "))
+
+
+def _followed(unpacked: Path, heading: str) -> str:
+    """What the commands of an archive's README print, with the program on the path."""
+    script = _commands((unpacked / "README.md").read_text(), heading)
+    path = f"{Path(PROGRAM).parent}:{os.environ['PATH']}"
+    done = subprocess.run(
+        ["sh", "-eu", "-c", script],
+        cwd=unpacked,
+        env={**os.environ, "PATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, (script, done.stdout, done.stderr)
+    return done.stdout
+
+
 def _long_run(folder: Path) -> Path:
     """A pile in three segments."""
     return walkers.run(brief_pile(), folder / "runs").directory
@@ -291,6 +297,44 @@ def _edited_deck(folder: Path) -> Path:
     subprocess.run(["sh", "run.sh"], cwd=deck, check=True)
     call("run", str(deck), check=True)
     return deck
+
+
+def _short_run(folder: Path) -> Path:
+    return walkers.run(make_case(run=SHORT), folder / "runs").directory
+
+
+def _sweep(folder: Path) -> Path:
+    """A sweep whose points share a deck."""
+    (folder / "base.toml").write_text(to_toml(document(run=SHORT)))
+    (folder / "angles.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+    return walkers.sweep(folder / "angles.toml", folder / "runs").directory
+
+
+@pytest.mark.parametrize("make", [_short_run, _edited_deck, _sweep])
+def test_the_commands_of_a_readme_repeat_the_run(make: Callable[[Path], Path], tmp_path: Path) -> None:
+    """As they are printed: with LIGGGHTS alone by the script and by hand, and with the program."""
+    (tmp_path / "made").mkdir()
+    directory = make(tmp_path / "made")
+    archive = write_archive(directory, tmp_path / "run.zip")
+    shutil.rmtree(tmp_path / "made")
+    unpacked = tmp_path / "unpacked"
+    shutil.unpack_archive(archive, unpacked)
+    told = _followed(unpacked, "With LIGGGHTS alone")
+    (by_hand,) = (path.parent for path in tmp_path.glob("repeated-by-liggghts/**/log.liggghts"))
+    run = unpacked / next(iter(read_json(unpacked / RECORD)["runs"]))
+    if by_hand.name == "shared_deck":
+        assert "written    shared_deck/beads.bin (nothing to compare with)" in told
+    else:
+        deck = by_hand.relative_to(tmp_path / "repeated-by-liggghts")
+        assert told.count("the same   ") == 3
+        assert (by_hand / "beads.bin").read_bytes() == (run / deck / "beads.bin").read_bytes()
+    shutil.rmtree(unpacked)
+    shutil.unpack_archive(archive, unpacked)
+    told = _followed(unpacked, "With granular-walkers")
+    assert "archive.json: OK" in told
+    assert f"\n{unpacked.name}: " in told
+    (repeated,) = (tmp_path / "repeated").glob("*/manifest.json")
+    assert Run(repeated.parent).result["velocity"] == pytest.approx(Run(run).result["velocity"], rel=1e-9)
 
 
 @pytest.mark.parametrize("make", [_long_run, pytest.param(_parallel_run, marks=pytest.mark.slow), _edited_deck])
@@ -334,19 +378,21 @@ def test_an_archive_says_what_it_cannot_repeat(shared: Path, repeat: Repeat, tmp
 
 def test_the_readme_says_who_made_the_archive_and_with_which_contact_model(run: Path, tmp_path: Path) -> None:
     assert read_manifest(run)["contact_model"].items() >= model_version().items()
-    author = [Author("A. User")]
     texts = []
-    for version in (model_version(), {"forces_version": model_version()["forces_version"]}, {}):
+    models = [{"path": "", **model_version()}, {"forces_version": model_version()["forces_version"]}, {}, None]
+    for model in models:
         manifest = read_manifest(run)
-        manifest["contact_model"] = {"path": "", "sha256": "", **version}
+        manifest["contact_model"] = model
         write_json(run / "manifest.json", manifest)
-        with zipfile.ZipFile(write_archive(run, tmp_path / "run.zip", authors=author)) as packed:
+        archive = write_archive(run, tmp_path / "run.zip", authors=["A. User", "*B*"], licence="CC0-1.0")
+        with zipfile.ZipFile(archive) as packed:
             texts.append(packed.read("README.md").decode())
-    assert "computed from it.\n\nBy A. User. Licence: CC-BY-4.0" in texts[0]
-    same, other, unknown = texts
+    assert "computed from it.\n\nBy A. User, \\*B\\*. Licence: CC0-1.0. The contact model" in texts[0]
+    same, other, unknown, by_hand = texts
     assert "The runs were made with these sources." in same
     assert "other sources that compute the same forces" in other
     assert "or do not record it" in unknown
+    assert "or do not record it" in by_hand, "a deck that was run by hand"
 
 
 @pytest.fixture(scope="session")
@@ -364,6 +410,22 @@ def uncertain(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     return once("uncertain", fill)
 
 
+def test_the_archive_of_a_draw_says_that_liggghts_cannot_repeat_it(uncertain: Path, tmp_path: Path) -> None:
+    """It has no tables of forces; the program repeats it."""
+    runs = [Path(run).name for run in load(uncertain / "runs" / "angles")["run"]]
+    draw = uncertain / "runs" / Path(load(uncertain / "runs" / f"{runs[1]}-spread")["run"][0]).name
+    assert not list(draw.rglob("bridges.txt"))
+    archive, unpacked = tmp_path / "draw.zip", tmp_path / "unpacked"
+    call("export", str(draw), "--to", "archive", "-o", str(archive), check=True)
+    shutil.unpack_archive(archive, unpacked)
+    readme = (unpacked / "README.md").read_text()
+    assert f"The run `runs/{draw.name}` cannot be repeated in this way" in readme
+    assert "repeat.sh" not in _commands(readme, "With LIGGGHTS alone")
+    _followed(unpacked, "With granular-walkers")
+    repeated = Run(tmp_path / "repeated" / draw.name).result["velocity"]
+    assert repeated == pytest.approx(Run(draw).result["velocity"], rel=1e-9)
+
+
 @pytest.mark.parametrize("what", ["a run", "a sweep"])
 def test_archives_have_the_spread_and_the_accuracy(what: str, uncertain: Path, tmp_path: Path) -> None:
     """A colleague sees the same band, error and figures, and the check finds nothing missing."""
@@ -374,7 +436,6 @@ def test_archives_have_the_spread_and_the_accuracy(what: str, uncertain: Path, t
     command = ["export", str(uncertain / "runs" / packed), "--to", "archive", "-o", str(archive)]
     call(*command, check=True)
     shutil.unpack_archive(archive, unpacked)
-    assert _issues(archive, tmp_path) == []
     there = unpacked / "runs"
     assert len(_verified(unpacked)) == 1
     for run in runs[:1] if what == "a run" else runs:

@@ -360,8 +360,8 @@ COMMANDS: list[tuple[str, str]] = [
     ("export {run} --to vtk --licence MIT", "--licence: is for --to archive"),
     *((f"export {{run}} --to archive {words}", told) for words, told in (
         ("-o run.tar", "-o: expected the name of a .zip file"),
-        ("--licence 'the public'", "licence: expected an SPDX identifier such as CC-BY-4.0"),
-        ("--author N --orcid 0000-0002-1825-009", "orcid: expected an ORCID"),
+        ("--licence ' '", "--licence: expected a licence such as CC-BY-4.0"),
+        ("--author N --author ''", "--author: expected names that are not empty"),
     )),
     ("render {run} --fps 10", "--fps: is for --film"),
     *((f"render --film {{run}} {words}", told) for words, told in (

@@ -552,7 +552,7 @@ def _archive(text: str, stranger: Stranger, folder: Path) -> object:
     manifest |= {"platform": text, "engine": {**manifest["engine"], "sha256": text}}
     write_json(run / "manifest.json", manifest)
     with zipfile.ZipFile(write_archive(run, folder / "archive.zip")) as archive:
-        json.loads(archive.read("ro-crate-metadata.json"))
+        json.loads(archive.read("archive.json"))
         archive.extractall(folder / "unpacked")
         names = [name.replace(Path(name).name, "") if name.endswith(".toml") else name for name in archive.namelist()]
     call("check", "files", str(folder / "unpacked"), check=True)

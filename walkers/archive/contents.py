@@ -13,16 +13,21 @@ from typing import Any, BinaryIO, NamedTuple
 
 from walkers.errors import refused
 from walkers.files import checksum, json_bytes, open_regular
+from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import toml_bytes
-from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME, SPREAD, SPREAD_NAME
+from walkers.postprocess.measure.uncertainty import ACCURACY, SPREAD, SPREAD_NAME
 from walkers.runner.compiled_model import build_script
-from walkers.runner.directory import CASE_NAME, case_of, name_of
+from walkers.runner.directory import SEGMENTS, case_of, name_of
 from walkers.runner.manifest import MANIFEST_NAME, read_manifest
 from walkers.runner.model_sources import model_sources
+from walkers.runs.making import DECK_FOLDER
 from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_record, states
+from walkers.templates.deck import BRIDGES_NAME, DECK_NAME
 
-METADATA_NAME = "ro-crate-metadata.json"
-"""Machine-readable description of an archive."""
+RECORD_FILE = "archive.json"
+"""Machine-readable description of an archive: its authors, and the programs that made each run."""
+README_FILE = "README.md"
+"""Description of an archive for readers."""
 SUMS_NAME = "sha256sums.txt"
 """List of checksums in an archive, in the format of ``sha256sum -c``."""
 RUNS = "runs"
@@ -31,37 +36,28 @@ MODEL_FOLDER = "contact_model"
 """Folder of the sources of the contact model in an archive."""
 REPEAT_NAME = "repeat.sh"
 """Script of an archive that repeats a run with the engine alone."""
-_ROLES: Mapping[str, Sequence[str]] = {
-    "case": (CASE_NAME, "*.toml"),
-    "record": (MANIFEST_NAME, RECORD_NAME),
-    "dump": ("beads.bin", "bridges.*.txt", "state.restart"),
-    "deck": ("walker.lig", "layout.json", "deck.json", "law.py", "run.sh", "scale.awk", "*.txt"),
-    "table": ("table.csv", "*.parquet"),
-    "result": ("result.json", ACCURACY_NAME, SPREAD_NAME),
-    "engine": ("*.cpp", "*.h", "*.map", "COPYING", "build.sh", REPEAT_NAME),
-}
-"""Roles of files in the actions of the crate, by their names; the first that fits. Others are output of the engine."""
+_DUMPS = ("beads.bin", "bridges.*.txt", "state.restart")
+"""Names of the dumps of the engine; ``bridges.txt`` has the tables of forces, which a deck needs."""
 
 
 class File(NamedTuple):
-    """A file of an archive: source or contents, SHA-256, and role in the actions of the crate."""
+    """A file of an archive: its source or its contents, and its SHA-256."""
 
     source: Path | bytes
     sha256: str
-    role: str
 
     @classmethod
-    def of(cls, place: str, source: Path | bytes, sha256: str | None = None) -> File:
-        """A file, whose checksum is computed if no manifest has it."""
-        if sha256 is None:
-            sha256 = hashlib.sha256(source).hexdigest() if isinstance(source, bytes) else checksum(source)
-        name = Path(place).name
-        roles = (role for role, names in _ROLES.items() if any(fnmatch(name, pattern) for pattern in names))
-        return cls(source, sha256, next(roles, "output"))
+    def of(cls, source: Path | bytes) -> File:
+        """A file whose checksum no manifest has."""
+        if isinstance(source, bytes):
+            return cls(source, hashlib.sha256(source).hexdigest())
+        return cls(source, checksum(source))
 
     def open(self) -> BinaryIO:
-        """The contents, to be read."""
-        return io.BytesIO(self.source) if isinstance(self.source, bytes) else open_regular(self.source)
+        """Open the contents for reading."""
+        if isinstance(self.source, bytes):
+            return io.BytesIO(self.source)
+        return open_regular(self.source)
 
 
 @dataclass(frozen=True)
@@ -74,6 +70,8 @@ class Contents:
         Of the run or the sweep.
     manifests
         Manifests of all runs by the places of their folders in the archive.
+    cases
+        Cases of all runs by these places.
     files
         Files by their places in the archive.
     main
@@ -83,6 +81,7 @@ class Contents:
     name: str
     title: str
     manifests: Mapping[str, dict[str, Any]]
+    cases: Mapping[str, Case]
     files: Mapping[str, File]
     main: Sequence[str]
 
@@ -100,6 +99,17 @@ class Contents:
     def left_out(self) -> bool:
         """Whether dumps of the runs that the archive is about are left out."""
         return any("left_out" in self.manifests[place] for place in self.main)
+
+    def deck_folder(self, place: str) -> str:
+        """Folder of the first deck of a run, relative to the run; ``.`` for a deck that was run by hand."""
+        for folder in (DECK_FOLDER, f"{SEGMENTS}/0000"):
+            if f"{place}/{folder}/{DECK_NAME}" in self.files:
+                return folder
+        return "."
+
+    def has_tables(self, place: str) -> bool:
+        """Whether a run has the tables of forces, without which its deck cannot be run."""
+        return (Path(place) / self.deck_folder(place) / BRIDGES_NAME).as_posix() in self.files
 
 
 def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
@@ -134,13 +144,13 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
         name, title = name_of(record.directory.name), record.sweep.title
         main = packing.add_sweep(record, name)
     else:
-        title = case_of(directory).title
         main = [packing.add_run(directory)]
+        title = packing.cases[main[0]].title
         name = Path(main[0]).name
     for place in main:
         packing.add_companions(packing.directories[place])
     packing.add_engine()
-    return Contents(name, title, packing.manifests, packing.files, main)
+    return Contents(name, title, packing.manifests, packing.cases, packing.files, main)
 
 
 class _Packing:
@@ -150,12 +160,13 @@ class _Packing:
         self.dumps = dumps
         self.files: dict[str, File] = {}
         self.manifests: dict[str, dict[str, Any]] = {}
+        self.cases: dict[str, Case] = {}
         self.directories: dict[str, Path] = {}
         """Directories of the runs by their places in the archive."""
 
-    def add(self, place: str, source: Path | bytes, sha256: str | None = None) -> None:
-        """Add a file; without its checksum, this is computed."""
-        self.files[place] = File.of(place, source, sha256)
+    def add(self, place: str, source: Path | bytes) -> None:
+        """Add a file that no manifest lists."""
+        self.files[place] = File.of(source)
 
     def add_run(self, directory: Path) -> str:
         """Add the files of a run's manifest, and its case file if that is known; return the place of the run."""
@@ -169,19 +180,22 @@ class _Packing:
         for name in manifest["files"]:
             if name in before:
                 continue
-            file = File.of(name, directory / name, manifest["sha256"].get(name))
-            if file.role == "dump" and not self.dumps:
+            if not self.dumps and _is_dump(name):
                 left_out.add(name)
-            else:
-                self.files[f"{place}/{name}"] = file
+                continue
+            source = directory / name
+            sums = manifest["sha256"]
+            file = File(source, sums[name]) if name in sums else File.of(source)
+            self.files[f"{place}/{name}"] = file
         if case.document:
             self.add(f"{place}/{name_of(case.name)}.toml", toml_bytes(case.document))
-        source: Path | bytes = directory / MANIFEST_NAME
-        if left_out != before:
+        if left_out == before:
+            self.add(f"{place}/{MANIFEST_NAME}", directory / MANIFEST_NAME)
+        else:
             manifest["left_out"] = sorted(left_out)
-            source = json_bytes(manifest)
-        self.add(f"{place}/{MANIFEST_NAME}", source)
+            self.add(f"{place}/{MANIFEST_NAME}", json_bytes(manifest))
         self.manifests[place] = manifest
+        self.cases[place] = case
         self.directories[place] = directory
         return place
 
@@ -221,3 +235,7 @@ class _Packing:
         self.add(f"{MODEL_FOLDER}/build.sh", build_script().encode())
         script = resources.files("walkers.archive").joinpath(REPEAT_NAME)
         self.add(REPEAT_NAME, script.read_bytes())
+
+
+def _is_dump(name: str) -> bool:
+    return any(fnmatch(Path(name).name, pattern) for pattern in _DUMPS)

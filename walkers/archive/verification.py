@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from walkers.archive.contents import METADATA_NAME, SUMS_NAME
+from walkers.archive.contents import RECORD_FILE, SUMS_NAME
 from walkers.errors import refused
 from walkers.runner.directory import CASE_NAME, SEGMENTS
 from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest
@@ -42,7 +42,20 @@ class Verification:
 def verify(path: Path) -> list[Verification]:
     """Compare a run, the runs of a sweep, or an unpacked archive with the checksums in manifests or in the archive.
 
-    Sweeps have a verification of the points, and one of each finished run.
+    Parameters
+    ----------
+    path
+        The directory of a run or a sweep, or the folder of an unpacked archive.
+
+    Returns
+    -------
+    list of Verification
+        One of a run or an archive. Of a sweep, one of its points, and one of each finished run.
+
+    Raises
+    ------
+    InputError
+        If the path is none of these, or the list of checksums of the archive cannot be read.
     """
     if (path / RECORD_NAME).is_file():
         record = read_record(path)
@@ -56,7 +69,7 @@ def verify(path: Path) -> list[Verification]:
         whole = Verification(record.sweep.name, f"{len(runs)} points have a run", {"missing": missing})
         return [whole, *map(_of_run, dict.fromkeys(runs))]
     if (path / SUMS_NAME).is_file():
-        return [_compared(path, _listed(path))]
+        return [_compared(path, _listed(path, (path / SUMS_NAME).read_bytes()))]
     if (path / MANIFEST_NAME).is_file():
         return [_of_run(path)]
     if path.is_file():
@@ -76,10 +89,10 @@ def _of_run(directory: Path) -> Verification:
         return Verification(directory.resolve().name, "files are not compared", {"doubtful": [doubt]})
 
 
-def _listed(path: Path) -> dict[str, str]:
-    """The checksums of an archive by place; every archive has metadata."""
-    listed = {METADATA_NAME: ""}
-    for line in (path / SUMS_NAME).read_text("utf-8", "replace").splitlines():
+def _listed(path: Path, text: bytes) -> dict[str, str]:
+    """The checksums in the list of an archive, by the paths of the files; every archive has a record."""
+    listed = {RECORD_FILE: ""}
+    for line in text.decode("utf-8", "replace").splitlines():
         checksum, _, place = line.partition("  ")
         if len(checksum) != 64 or not place:
             raise refused(path, f"{SUMS_NAME}: expected a checksum and a path, found {line[:80]!r}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated
 
@@ -36,16 +35,13 @@ class Options:
         archive: leave out the engine's dumps; tables and results are included.
     authors
         archive: name of an author. Repeatable.
-    orcid
-        archive: ORCID of an author, in the order of --author. Repeatable.
     licence
-        archive: an SPDX identifier; default: CC-BY-4.0.
+        archive: licence of the data, such as CC-BY-4.0; default: not stated.
     """
 
     every: int | None = None
     dumps: Annotated[bool, Parameter("--without-dumps")] = False
     authors: Annotated[list[str] | None, Parameter("--author")] = None
-    orcid: list[str] | None = None
     licence: str | None = None
 
 
@@ -64,18 +60,12 @@ def export(
     ----------
     form
         Format of the export. deck: LIGGGHTS deck of the case. vtk: .vtu files, their .pvd, and the script show.py that
-        shows them in ParaView. lammps: the trajectory as a LAMMPS dump, for OVITO, ASE, MDAnalysis. archive: an
-        RO-Crate (.zip) to publish.
+        shows them in ParaView. lammps: the trajectory as a LAMMPS dump, for OVITO, ASE, MDAnalysis. archive: a zip
+        file with checksums, to publish.
     to
         File or folder to write; default: in the run's folder, archives in the current folder. Decks are printed.
     """
     given = {option: value for option, value in vars(options).items() if value not in (None, False)}
-    orcids = given.pop("orcid", [])
-    refuse("--orcid", len(orcids) > len(given.get("authors", [])), "expected an --author for each")
-    if "authors" in given:
-        from walkers.archive.crate import Author
-
-        given["authors"] = [Author(*author) for author in zip_longest(given["authors"], orcids)]
     if "dumps" in given:
         given["dumps"] = False
     if form != "deck":
