@@ -228,6 +228,70 @@ def test_archives_whose_lists_are_not_what_they_hold(
     assert any(said in line for line in _verified(tmp_path / "unpacked", status))
 
 
+def _rewritten(archive: Path, to: Path, contents: dict[str, bytes | None]) -> None:
+    """A copy of a zip file with other contents of some files; those with None are left out, unknown ones are added."""
+    with zipfile.ZipFile(archive) as source, zipfile.ZipFile(to, "w", zipfile.ZIP_DEFLATED) as copy:
+        files = {name: source.read(name) for name in source.namelist()}
+        for name, text in {**files, **contents}.items():
+            if text is not None:
+                copy.writestr(name, text)
+
+
+def _with_a_second(archive: Path, to: Path, name: str) -> None:
+    """A copy of a zip file with a second file of a name."""
+    shutil.copy(archive, to)
+    with zipfile.ZipFile(archive) as source, zipfile.ZipFile(to, "a") as copy:
+        copy.writestr(zipfile.ZipInfo(name), source.read(name))
+
+
+def _with_a_flipped_byte(archive: Path, to: Path, name: str) -> None:
+    """A copy of a zip file in which a byte of a compressed file is another one."""
+    with zipfile.ZipFile(archive) as source:
+        entry = source.getinfo(name)
+    contents = bytearray(archive.read_bytes())
+    contents[entry.header_offset + 30 + len(name) + entry.compress_size // 2] ^= 0xFF
+    to.write_bytes(contents)
+
+
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_an_archive_that_is_not_unpacked_is_checked_as_it_is(archive: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(archive) as packed:
+        files = packed.namelist()
+    table = next(name for name in files if name.endswith("walkers.parquet"))
+    whole, one_less = f"{len(files) - 1} files are unchanged", f"{len(files) - 2} files are unchanged"
+    assert _verified(archive) == [f"run.zip: {whole}"]
+    to = tmp_path / "copy.zip"
+    _rewritten(archive, to, {table: b"other"})
+    assert _verified(to, 1) == [f"copy.zip: {one_less}", f"  changed    {table}"]
+    _rewritten(archive, to, {table: None})
+    assert _verified(to, 1) == [f"copy.zip: {one_less}", f"  missing    {table}"]
+    _rewritten(archive, to, {"\x1b[2J.txt": b"new"})
+    assert _verified(to, 1) == [f"copy.zip: {whole}", r"  not listed \x1b[2J.txt"]
+    _with_a_second(archive, to, table)
+    assert _verified(to, 1) == [f"copy.zip: {whole}", f"  not listed {table}"]
+    _with_a_flipped_byte(archive, to, table)
+    assert _verified(to, 1) == [f"copy.zip: {one_less}", f"  changed    {table}"]
+
+
+@pytest.mark.parametrize(
+    ("contents", "said"),
+    [
+        (lambda archive: archive.read_bytes()[:-100], "expected an archive, a zip file"),
+        (lambda _: b"no zip", "expected an archive, a zip file"),
+        (lambda _: b"PK\x05\x06" + bytes(18), f"expected an archive, which has a {SUMS}"),
+    ],
+    ids=["cut", "text", "empty"],
+)
+def test_what_is_no_archive_is_refused(
+    contents: Callable[[Path], bytes], said: str, archive: Path, tmp_path: Path
+) -> None:
+    to = tmp_path / "copy.zip"
+    to.write_bytes(contents(archive))
+    (line,) = _verified(to, 2)
+    assert said in line
+    assert str(to) in line
+
+
 @pytest.fixture(scope="session")
 def built_model(archive: Path, once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     """The contact model as it is compiled from the sources in an archive: four seconds."""

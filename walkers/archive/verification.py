@@ -1,7 +1,11 @@
-"""Check whether the files of a run, a sweep or an unpacked archive are unchanged."""
+"""Check whether the files of a run, a sweep or an archive are unchanged."""
 
 from __future__ import annotations
 
+import hashlib
+import zipfile
+import zlib
+from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +20,8 @@ from walkers.text import printable
 _READ = (".json", ".parquet", ".txt", ".lig", ".bin")
 """Suffixes of the files of a run that are read again."""
 _HARMLESS = ("made since", "left out")
+_UNREADABLE = (OSError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error)
+"""Errors of reading a zip file that is damaged, encrypted or compressed in an unknown way."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +46,12 @@ class Verification:
 
 
 def verify(path: Path) -> list[Verification]:
-    """Compare a run, the runs of a sweep, or an unpacked archive with the checksums in manifests or in the archive.
+    """Compare a run, the runs of a sweep, or an archive with the checksums in manifests or in the archive.
 
     Parameters
     ----------
     path
-        The directory of a run or a sweep, or the folder of an unpacked archive.
+        The directory of a run or a sweep, an archive, or the folder of an unpacked archive.
 
     Returns
     -------
@@ -73,7 +79,7 @@ def verify(path: Path) -> list[Verification]:
     if (path / MANIFEST_NAME).is_file():
         return [_of_run(path)]
     if path.is_file():
-        raise refused(path, "not a folder; unpack an archive, then: walkers check files FOLDER")
+        return [_of_zip(path)]
     kinds = f"a run directory (with a {MANIFEST_NAME}), a sweep's ({RECORD_NAME}), or an archive ({SUMS_NAME})"
     raise refused(path, f"expected {kinds}")
 
@@ -98,6 +104,40 @@ def _listed(path: Path, text: bytes) -> dict[str, str]:
             raise refused(path, f"{SUMS_NAME}: expected a checksum and a path, found {line[:80]!r}")
         listed[place] = checksum
     return listed
+
+
+def _of_zip(path: Path) -> Verification:
+    """Compare the files of an archive that is not unpacked with the checksums in it."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if SUMS_NAME not in archive.namelist():
+                raise refused(path, f"expected an archive, which has a {SUMS_NAME}")
+            listed = _listed(path, archive.read(SUMS_NAME))
+            entries = Counter(archive.namelist())
+            changed = [
+                name for name, checksum in listed.items() if name in entries and _checksum_in(archive, name) != checksum
+            ]
+    except _UNREADABLE as error:
+        raise refused(path, f"expected an archive, a zip file ({error})") from error
+    unlisted = [name for name in entries if name not in listed and name != SUMS_NAME]
+    # Of two files of a name, programs that unpack take one or the other.
+    unlisted += [name for name, number in entries.items() if number > 1]
+    findings = {
+        "changed": changed,
+        "missing": [name for name in listed if name not in entries],
+        "not listed": unlisted,
+    }
+    unchanged = len(listed) - len(changed) - len(findings["missing"])
+    return Verification(path.name, f"{unchanged} files are unchanged", findings)
+
+
+def _checksum_in(archive: zipfile.ZipFile, name: str) -> str | None:
+    """SHA-256 of a file in an archive; None if it cannot be read."""
+    try:
+        with archive.open(name) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()  # type: ignore[arg-type]
+    except _UNREADABLE:
+        return None
 
 
 def _compared(folder: Path, listed: Mapping[str, str], left_out: Collection[str] = ()) -> Verification:

@@ -84,7 +84,7 @@ def literature(*only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAUL
 
 @check.command
 def files(name: RunOrSweep, /, *, at: At = At()) -> int:
-    """Compare the files of a run, a sweep or an unpacked archive (its folder) with their checksums."""
+    """Compare the files of a run, a sweep or an archive (a .zip file or its folder) with their checksums."""
     from walkers.api import directory_of
     from walkers.archive.verification import verify
 
