@@ -25,7 +25,13 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from docs import effects, tables
+from docs import tables
+from studies import effects
+from studies.literature import experiments
+from studies.literature.benchmarks import curve_of, published
+from studies.literature.checks import LITERATURE
+from studies.paper.make import COMPARED, FIGURES, make_figures
+from studies.paper.sources import sweep_of
 from walkers import load_case, run, sweep
 from walkers.api import Changes, climb
 from walkers.calibration.calibrate import calibrate
@@ -35,14 +41,9 @@ from walkers.errors import InputError, Problem
 from walkers.files import read_json, write_bytes, write_json
 from walkers.inputs.sweep import Sweep, load_sweep
 from walkers.inputs.tables.case import Case
-from walkers.paper.make import COMPARED, FIGURES, make_figures
-from walkers.paper.sources import sweep_of
 from walkers.postprocess.measure.results import VERSION, modules_of
 from walkers.postprocess.show.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
-from walkers.second_engine import experiments
-from walkers.second_engine.benchmarks import curve_of, published
 from walkers.second_engine.lines import as_dict, failures, run_checks
-from walkers.second_engine.literature import LITERATURE
 from walkers.sweeps.climbing import texts_of
 from walkers.sweeps.scheduler import Options
 from walkers.templates.deck import CONTENT_VERSION
@@ -52,7 +53,7 @@ if TYPE_CHECKING:
 
 RECORD = Path("figures") / "made-from.json"
 CHECKED = Path("figures") / "validation.json"
-"""Lines of ``walkers check literature``, of which pages quote numbers."""
+"""Lines of ``python -m studies.literature``, of which pages quote numbers."""
 _BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n).*?(?=^```)")
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->[^<]*<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
@@ -205,7 +206,7 @@ def _make_climbs(out: Path, docs: Path) -> None:
 
 @_illustration("unexplained", "figures/unexplained.md", cases=_shipped("fig1b", "fig4a", "fig4b"))
 def _make_effects(_: Path, docs: Path) -> None:
-    write_bytes(docs / "figures" / "unexplained.md", effects.table().encode())
+    write_bytes(docs / "figures" / "unexplained.md", tables.page(effects.COMMAND, effects.rows()).encode())
 
 
 _CHECKED_CASES = _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci")
@@ -343,8 +344,8 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
 
 
 def pages_of(docs: Path) -> list[Path]:
-    """README and all pages of the documentation."""
-    return [docs.parent / "README.md", *sorted(docs.rglob("*.md"))]
+    """README, the article and all pages of the documentation."""
+    return [docs.parent / "README.md", docs.parent / "studies" / "article.md", *sorted(docs.rglob("*.md"))]
 
 
 def facts(docs: Path) -> dict[str, str]:

@@ -1,24 +1,29 @@
-"""What effects that the law leaves out would change, by the theory: ``python -m docs.effects`` prints the table.
+"""What effects that the law leaves out would change, by the theory: ``python -m studies.effects`` prints the table.
 
-docs/explanation/unexplained.md explains the effects. SI units.
+docs/explanation/unexplained.md explains the effects and shows the table. SI units.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from math import pi, sqrt
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from docs.tables import page
 from walkers import load_case
 from walkers.arrays import FloatArray
+from walkers.extras import require
 from walkers.inputs.resolving.loads import contact_loads, dimer_of
 from walkers.inputs.tables.case import Case
+from walkers.main import main, new_app
+from walkers.text import aligned
 from walkers.theory.motion import Walker, walk
+
+COMMAND = "python -m studies.effects"
+app = new_app(COMMAND)
 
 _STEPS = 512  # per cycle; 2048 change velocities by less than 0.01 mm/s
 _LIFT = sqrt(140.0)  # a sphere under the load N rolls at h = 140 R (η U R/N)² in a liquid that cavitates
@@ -105,11 +110,10 @@ def _common(edges: FloatArray, apart: float) -> float:
     return float(edges**2 @ np.arccos(parts / edges) - apart * sqrt(edges[0] ** 2 - parts[0] ** 2))
 
 
-@njit
 def acts(
     sliding: tuple[float, float, float], normal: FloatArray, friction: FloatArray, terms: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The effects in the motion (`walkers.theory.motion.walk`)."""
+    """The effects in the motion (`walkers.theory.motion.walk`), to be compiled."""
     along = 0.5 * (sliding[0] + sliding[1] - sliding[2])
     spins = (along - sliding[0], along - sliding[1])  # velocities -R dφ/dt
     entraining = (0.5 * (along + spins[0]), 0.5 * (along + spins[1]), 0.5 * (spins[0] - spins[1]))
@@ -126,6 +130,15 @@ def acts(
     return friction, forces, couples
 
 
+@cache
+def _compiled() -> Callable[..., Any]:
+    """`acts` as the theory calls it, compiled once."""
+    from numba import njit
+
+    compiled: Callable[..., Any] = njit(acts)
+    return compiled
+
+
 def row(effect: Effect) -> dict[str, str]:
     """The row of an effect in the table."""
     cases = [load_case(name, {**changes, **effect.changes}) for name, changes in _CASES.values()]
@@ -136,8 +149,13 @@ def row(effect: Effect) -> dict[str, str]:
     squeezed = np.array([3.0 * pi * case.liquid.of_bridges.viscosity * _curved(case) for case in cases]).T
     resistances[0] += effect.asperities * squeezed
     walker = replace(walker, friction=walker.friction * more, at_rest=walker.at_rest - lost.T, resistances=resistances)
-    drives = ([getattr(case.excitation, name) for case in cases] for name in ("frequency", "peak_acceleration"))
-    motion = walk(walker, *drives, steps_per_cycle=_STEPS, effect=(acts, terms))
+    motion = walk(
+        walker,
+        [case.excitation.frequency for case in cases],
+        [case.excitation.peak_acceleration for case in cases],
+        steps_per_cycle=_STEPS,
+        effect=(_compiled(), terms),
+    )
     velocity = dict(zip(_CASES, 1e3 * motion.velocity, strict=True))
     mean = {peak: (velocity[f"{peak} g, 60 Hz"] + velocity[f"{peak} g, 90 Hz"]) / 2.0 for peak in _PEAKS}
     slide = effect.asperities * squeezed[0, 0] * _SHOWN / dimer_of(cases[0]).capillary_scale
@@ -156,10 +174,19 @@ def row(effect: Effect) -> dict[str, str]:
     return {"mm/s": effect.name, **texts}
 
 
-def table() -> str:
-    """The page of the table."""
-    return page("python -m docs.effects", list(map(row, EFFECTS)))
+def rows() -> list[dict[str, str]]:
+    """The table: a row for each of `EFFECTS`, texts by the heads of the columns."""
+    require("theory")
+    return [row(effect) for effect in EFFECTS]
+
+
+@app.default
+def effects() -> None:
+    """Print what effects that the law leaves out would change: velocities by the theory, mm/s."""
+    table = rows()
+    heads = list(table[0])
+    print(aligned([heads, *(list(row.values()) for row in table)], right=range(1, len(heads))))
 
 
 if __name__ == "__main__":
-    print(table())
+    main(app=app)

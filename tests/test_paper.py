@@ -10,6 +10,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from studies.paper.comparison import _text_of, compare
+from studies.paper.figures import theory_of_cycles
+from studies.paper.make import FIGURES, make_figures
+from studies.paper.sources import NothingFinishedError, Sources, of_facts, ruby, sets, sweep_of
 from tests.conftest import call
 from tests.printed import letters, spoilt
 from walkers.arrays import FloatArray
@@ -20,10 +24,6 @@ from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.sweep import expand
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.paper.comparison import _text_of, compare
-from walkers.paper.figures import theory_of_cycles
-from walkers.paper.make import FIGURES, make_figures
-from walkers.paper.sources import NothingFinishedError, Sources, of_facts, ruby, sets, sweep_of
 from walkers.postprocess.measure.gait import gait
 from walkers.sweeps.record import read_record, write_record
 from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
@@ -150,7 +150,7 @@ def test_the_papers_curve_stands_beside_ours_uncounted(sources: Sources, compare
 
 
 def test_the_table_is_of_all_of_it(compared: dict[str, Any]) -> None:
-    told = rendered("walkers.paper", "comparison.md.j2", **compared)
+    told = rendered("studies.paper", "comparison.md.j2", **compared)
     assert all(one["says"] in told and one["expected"] in told for one in compared["facts"])
     tables = [part.splitlines() for part in told.split("\n\n") if part.startswith("|")]
     assert [len({line.count("|") for line in table}) for table in tables] == [1] * 4
@@ -193,7 +193,7 @@ def test_figures_and_comparison_do_without_what_failed(sources: Sources, tmp_pat
     assert missing["walks"]
     assert missing["fig4a_velocity"] is (lost is None)
     assert not any(one["agree"]["shipped"] for one in found["facts"] if missing[one["name"]])
-    assert rendered("walkers.paper", "comparison.md.j2", **found).count("no walker") >= sum(missing.values())
+    assert rendered("studies.paper", "comparison.md.j2", **found).count("no walker") >= sum(missing.values())
 
 
 def test_the_theory_of_fig4_goes_through_the_cycle_as_the_engine_does(sources: Sources) -> None:

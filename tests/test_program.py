@@ -27,6 +27,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import walkers
+from studies.paper.make import make_figures
 from tests.conftest import SHORT, call, document, to_toml
 from tests.tools.plant_faults import problems_of
 from walkers import load_case
@@ -37,7 +38,6 @@ from walkers.errors import InputError
 from walkers.extras import EXTRAS, ExtraMissing, module_of
 from walkers.inputs.reading import shipped
 from walkers.main import program
-from walkers.paper.make import make_figures
 from walkers.postprocess.measure.results import read
 from walkers.postprocess.measure.tables import read_table
 from walkers.runner.binary import find_engine

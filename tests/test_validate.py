@@ -16,15 +16,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from studies.literature import checks, experiments
+from studies.literature.benchmarks import TESTS, largest, published
+from studies.literature.bridges import LAWS, pulls
 from tests.conftest import call
 from walkers.inputs.reading import load_case
 from walkers.physics.capillary import derjaguin_radius
 from walkers.postprocess.measure.motion import Motion
 from walkers.runner.failures import EngineFailure
 from walkers.runner.launch import ALONE
-from walkers.second_engine import experiments, literature
-from walkers.second_engine.benchmarks import TESTS, largest, published
-from walkers.second_engine.bridges import LAWS, pulls
 from walkers.second_engine.crosscheck import courses
 from walkers.second_engine.lines import Line, Verdict, as_dict, as_text, failures
 
@@ -62,7 +62,7 @@ def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
     def fail(out: Path) -> None:
         raise EngineFailure("no engine here")
 
-    monkeypatch.setitem(literature.LITERATURE, "crosscheck", fail)
+    monkeypatch.setitem(checks.LITERATURE, "crosscheck", fail)
     done = call("check", "literature", "benchmarks", "crosscheck", "--json")
     contents = json.loads(done.stdout)
     assert (done.returncode, contents["passed"]) == (1, False)

@@ -22,7 +22,7 @@ RECORDS = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibr
 """Files that identify directories; named here to avoid imports."""
 _PACKAGES = (
     *("physics", "inputs", "templates", "runner", "postprocess"),
-    *("runs", "sweeps", "archive", "second_engine", "theory", "paper", "calibration"),
+    *("runs", "sweeps", "archive", "second_engine", "theory", "calibration"),
 )
 _MODULES = {**dict.fromkeys(__all__, "api"), **{"load_case": "inputs.reading", "new": "inputs.new"}}
 """Modules of the public names."""

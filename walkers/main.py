@@ -51,15 +51,15 @@ def _on_signal(number: int, _frame: FrameType | None) -> NoReturn:
     raise _Terminated(number)
 
 
-def main(arguments: list[str] | None = None) -> NoReturn:
-    """Run the program and exit."""
+def main(arguments: list[str] | None = None, app: App | None = None) -> NoReturn:
+    """Run the program, or another app of `new_app`, with the arguments of the command line, and exit."""
     _prepare_streams()
     os.environ["MPLBACKEND"] = "agg"  # the program opens no windows, and matplotlib refuses unknown names
     signal.signal(signal.SIGTERM, _on_signal)
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
         signal.signal(signal.SIGHUP, _on_signal)
     warnings.showwarning = lambda message, *_, **__: print(f"walkers: warning: {message}", file=sys.stderr)
-    sys.exit(_status(sys.argv[1:] if arguments is None else arguments))
+    sys.exit(_status(sys.argv[1:] if arguments is None else arguments, app))
 
 
 def _prepare_streams() -> None:
@@ -78,17 +78,18 @@ def _prepare_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
-def _status(tokens: list[str]) -> int:
-    """Run the program and return its exit status. Unexpected errors are raised."""
+def _status(tokens: list[str], app: App | None = None) -> int:
+    """Run the program, or another app, and return its exit status. Unexpected errors are raised."""
     try:
         outcome = None
-        if tokens in ([], ["--help"], ["-h"]):
+        if app is None and tokens in ([], ["--help"], ["-h"]):
             print_help()
         else:
-            outcome = program()(tokens)
+            app = app or program()
+            outcome = app(tokens)
         sys.stdout.flush()
     except (Exception, KeyboardInterrupt, SystemExit, _Terminated) as stop:
-        return _report_stop(stop, tokens)
+        return _report_stop(stop, tokens, app or program())
     return outcome if isinstance(outcome, int) else 0
 
 
@@ -135,17 +136,40 @@ def _plain(text: Any) -> str:
 
 def program() -> App:
     """The program. A command is imported when it is called."""
-    from cyclopts import App, Parameter
-
-    quiet: dict[str, Any] = {"print_error": False, "exit_on_error": False, "suppress_keyboard_interrupt": False}
-    look: dict[str, Any] = {"help_formatter": _PlainHelp(), "help_format": "plaintext", "group_parameters": "Options"}
-    usual: dict[str, Any] = {"default_parameter": Parameter(negative=()), "result_action": "return_value"}
-    app = App("walkers", _SUMMARY, version_flags=(), **usual, **quiet, **look)
+    app = new_app("walkers", _SUMMARY)
     for command in ALL_COMMANDS:
         app.command(command.place, name=command.name, help=command.summary)
     app.command(print_version, name="--version")
     app.register_install_completion_command(help=_OPTIONS["--install-completion"])
     return app
+
+
+def new_app(name: str, summary: str | None = None) -> App:
+    """An app with help in plain text, which leaves the messages about errors to `main`.
+
+    Parameters
+    ----------
+    name
+        How the app is called, such as ``walkers``; messages and help name it so.
+    summary
+        The first line of its help; default: that of its default command.
+    """
+    from cyclopts import App, Parameter
+
+    formatter: Any = _PlainHelp()  # its unused arguments have names of their own
+    return App(
+        name,
+        summary,
+        version_flags=(),
+        default_parameter=Parameter(negative=()),
+        result_action="return_value",
+        print_error=False,
+        exit_on_error=False,
+        suppress_keyboard_interrupt=False,
+        help_formatter=formatter,
+        help_format="plaintext",
+        group_parameters="Options",
+    )
 
 
 def print_version() -> None:
@@ -169,13 +193,13 @@ def print_version() -> None:
     print(f"{version or 'an engine that does not name its version'}, {path}")
 
 
-def _report_stop(stop: BaseException, tokens: list[str]) -> int:
+def _report_stop(stop: BaseException, tokens: list[str], app: App) -> int:
     from cyclopts import CycloptsError, MissingArgumentError, UnusedCliTokensError
 
     if isinstance(stop, SystemExit):
         return stop.code if isinstance(stop.code, int) else 0
     if isinstance(stop, InputError):
-        stop = stop.renamed(lambda source: source if source in tokens else _options_of(source, tokens))
+        stop = stop.renamed(lambda source: source if source in tokens else _options_of(source, tokens, app))
     if isinstance(stop, _Terminated):
         return _tell(str(stop), stop.status)
     statuses = {InputError: 2, WalkersError: 1, KeyboardInterrupt: _INTERRUPTED}
@@ -193,7 +217,7 @@ def _report_stop(stop: BaseException, tokens: list[str]) -> int:
     message = f"Unexpected: {' '.join(unused)}." if unused else str(stop)
     if isinstance(stop, MissingArgumentError) and stop.argument and (choices := stop.argument.get_choices()):
         message += f" Choose from: {', '.join(choices)}."
-    help_command = " ".join(["walkers", *(stop.command_chain or ()), "--help"])
+    help_command = " ".join([*app.name, *(stop.command_chain or ()), "--help"])
     return _tell(f"{shortened(printable(message), _LONGEST_MESSAGE)} See: {help_command}", 2)
 
 
@@ -215,9 +239,9 @@ def _clock_is_wrong() -> bool:
     return False
 
 
-def _options_of(names: str, tokens: list[str]) -> str:
+def _options_of(names: str, tokens: list[str], app: App) -> str:
     """The options of the command for arguments of a function of the package, such as ``begin, end``."""
-    _, apps, _ = program().parse_commands(tokens)
+    _, apps, _ = app.parse_commands(tokens)
     arguments = apps[-1].assemble_argument_collection()
     options = {argument.name[2:]: argument.name for argument in arguments}
     options |= {argument.field_info.name: argument.name for argument in arguments}

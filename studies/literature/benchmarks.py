@@ -178,7 +178,7 @@ PANELS: Mapping[str, Panel] = {
 
 def published() -> dict[str, Any]:
     """The panels of ``chung_ooi.toml``, points as arrays of shape (N, 2)."""
-    panels = tomllib.loads(files("walkers.second_engine").joinpath("chung_ooi.toml").read_text("utf-8"))
+    panels = tomllib.loads(files("studies.literature").joinpath("chung_ooi.toml").read_text("utf-8"))
     for panel in panels.values():
         for series in panel["series"]:
             series["points"] = np.array(series["points"], dtype=np.float64)

@@ -1,20 +1,30 @@
-"""``walkers check literature``: the second engine and the bridge laws beside published numbers and exact solutions."""
+"""All comparisons with the literature, by name."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 
-from walkers.second_engine.benchmarks import benchmarks
-from walkers.second_engine.bridges import pulls, velocities
+from studies.literature.benchmarks import benchmarks
+from studies.literature.bridges import pulls, velocities
+from studies.literature.experiments import experiments
 from walkers.second_engine.crosscheck import crosschecks
-from walkers.second_engine.experiments import experiments
 from walkers.second_engine.lines import Line
 
+
+def _benchmarks(_out: Path) -> Iterable[Line]:
+    return benchmarks()
+
+
+def _bridges(out: Path) -> Iterator[Line]:
+    yield from pulls()
+    yield from velocities(out)
+
+
 LITERATURE: Mapping[str, Callable[[Path], Iterable[Line]]] = {
-    "benchmarks": lambda _: benchmarks(),
-    "bridges": lambda out: [*pulls(), *velocities(out)],
+    "benchmarks": _benchmarks,
+    "bridges": _bridges,
     "crosscheck": crosschecks,
     "experiments": experiments,
 }
-"""Checks by name, from the folder of runs."""
+"""Each gives its lines from the folder of runs, where missing runs are made."""

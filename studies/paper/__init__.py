@@ -1,4 +1,5 @@
 """The paper's figures with engine and theory, and a comparison with its measurements and statements.
 
-Uses finished sweeps (the numbers of the engine), `walkers.theory`, and the observations of the calibration ``ruby``.
+`make` runs the missing points of the shipped sweeps, draws the figures and writes the comparison. The facts are the
+observations of the calibration ``ruby``.
 """

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from studies.paper.sources import Sources, of_facts, ruby, sets, sweep_of, thresholds_with_theory
 from walkers.calibration.observations import LEAST_SPEED, Observation, numbers_in
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.paper.sources import Sources, of_facts, ruby, sets, sweep_of, thresholds_with_theory
 from walkers.postprocess.measure.results import plain
 from walkers.runner.directory import case_of
 from walkers.theory.prediction import MODEL, PAPER, predicted_column

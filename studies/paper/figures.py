@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from studies.paper.sources import Sources, described, ruby, thresholds_with_theory
 from walkers.arrays import FloatArray
-from walkers.paper.sources import Sources, described, ruby, thresholds_with_theory
 from walkers.postprocess.measure.gait import gait
 from walkers.postprocess.show.drawing import ONE_COLUMN, TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
 from walkers.postprocess.show.necks import bridges_at

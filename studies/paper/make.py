@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from studies.paper.comparison import compare
+from studies.paper.figures import fig1b, fig2_threshold, fig3, fig4, of_sweep
+from studies.paper.sources import NothingFinishedError, Sources, of_facts, sets, sweep_of
 from walkers.errors import refused
 from walkers.extras import require
 from walkers.files import write_bytes, write_json
-from walkers.paper.comparison import compare
-from walkers.paper.figures import fig1b, fig2_threshold, fig3, fig4, of_sweep
-from walkers.paper.sources import NothingFinishedError, Sources, of_facts, sets, sweep_of
 from walkers.postprocess.show.drawing import check_formats, save_figure
 from walkers.progress import progress_of
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
@@ -64,45 +64,99 @@ def make_figures(
     *,
     only: Sequence[str] = (),
     formats: Sequence[str] = FORMATS,
+    engine: str | None = None,
     progress: bool | None = False,
-    **how: Any,
 ) -> Made:
-    """Make the missing runs in the folder ``out``, draw the figures and write the comparison to the folder ``to``.
+    """Make the missing runs, draw the figures and write the comparison.
 
-    ``only`` are names of `FIGURES`, or ``comparison``; if empty, all. ``options`` and ``how`` are as for
-    `walkers.sweeps.scheduler.run_sweep`. `InputError` if a figure or format does not exist, or a folder is a file.
+    Parameters
+    ----------
+    out
+        Folder of the runs.
+    to
+        Folder of the figures and the comparison.
+    options
+        How many decks run at the same time, and where.
+    only
+        Names of `FIGURES`, or ``comparison``; if empty, all of them.
+    formats
+        Formats of the figures: png, svg or pdf.
+    engine
+        Name or path of the binary; default: the installed one.
+    progress
+        Whether to show the progress of sweeps; None: in notebooks only.
+
+    Returns
+    -------
+    Made
+        The written files, and what is missing.
+
+    Raises
+    ------
+    walkers.errors.InputError
+        If a figure or a format does not exist, or a folder is a file.
     """
     require("theory")
-    names = (*FIGURES, COMPARISON)
-    chosen = list(only) or list(names)
-    for name in chosen:
-        if name not in names:
-            raise refused("only", f'no figure "{name}"; expected one of {", ".join(names)}')
+    chosen = list(only) or [*FIGURES, COMPARISON]
+    _check_names(chosen)
     check_formats(formats)
-    for option, folder in (("out", out), ("to", to)):
-        if folder.exists() and not folder.is_dir():
-            raise refused(option, f"expected a folder, {folder} is a file")
-    needed = [FIGURES[name].sweeps if name in FIGURES else COMPARED for name in chosen]
-    failed: dict[str, list[Failure]] = {}
-    for sweep in dict.fromkeys(sweep for sweeps in needed for sweep in sweeps):
+    _check_folder("out", out)
+    _check_folder("to", to)
+    failures: dict[str, list[Failure]] = {}
+    for sweep in _sweeps_of(chosen):
         with progress_of(sweep, progress) as advance:
-            _, failures = run_sweep(sweep_of(sweep), out, options, on_progress=advance, **how)
-        failed |= {sweep: failures} if failures else {}
+            _, failed = run_sweep(sweep_of(sweep), out, options, engine=engine, on_progress=advance)
+        if failed:
+            failures[sweep] = failed
     files: list[Path] = []
     left_out: dict[str, str] = {}
-    for name in (name for name in chosen if name in FIGURES):
-        drawing, sources = FIGURES[name], Sources(out)
+    for name in chosen:
+        if name not in FIGURES:
+            continue
         try:
-            runs = sources.runs(drawing.sweeps)
-            files += save_figure(drawing.draw(sources), to / name, runs, formats, drawing.title)
+            files += _save(name, Sources(out), to, formats)
         except NothingFinishedError as missing:
             left_out[name] = str(missing)
     counts: dict[str, tuple[int, int]] = {}
     if COMPARISON in chosen:
         comparison = compare(Sources(out))
-        files += [page := to / f"{COMPARISON}.md", record := to / f"{COMPARISON}.json"]
-        to.mkdir(parents=True, exist_ok=True)
-        write_bytes(page, rendered("walkers.paper", "comparison.md.j2", **comparison).encode())
-        write_json(record, comparison)
-        counts = {name: (facts["agree"], facts["of"]) for name, facts in comparison["sets"].items()}
-    return Made(files, failed, left_out, counts)
+        files += _write_comparison(comparison, to)
+        for name, facts in comparison["sets"].items():
+            counts[name] = (facts["agree"], facts["of"])
+    return Made(files, failures, left_out, counts)
+
+
+def _check_names(chosen: Iterable[str]) -> None:
+    names = (*FIGURES, COMPARISON)
+    for name in chosen:
+        if name not in names:
+            raise refused("only", f'no figure "{name}"; expected one of {", ".join(names)}')
+
+
+def _check_folder(option: str, folder: Path) -> None:
+    if folder.exists() and not folder.is_dir():
+        raise refused(option, f"expected a folder, {folder} is a file")
+
+
+def _sweeps_of(chosen: Iterable[str]) -> list[str]:
+    """Sweeps of figures and of the comparison, each once."""
+    sweeps: dict[str, None] = {}
+    for name in chosen:
+        needed = FIGURES[name].sweeps if name in FIGURES else COMPARED
+        sweeps |= dict.fromkeys(needed)
+    return list(sweeps)
+
+
+def _save(name: str, sources: Sources, to: Path, formats: Sequence[str]) -> list[Path]:
+    drawing = FIGURES[name]
+    runs = sources.runs(drawing.sweeps)
+    return save_figure(drawing.draw(sources), to / name, runs, formats, drawing.title)
+
+
+def _write_comparison(comparison: dict[str, Any], to: Path) -> list[Path]:
+    """Write the comparison as a page and as JSON."""
+    page, record = to / f"{COMPARISON}.md", to / f"{COMPARISON}.json"
+    to.mkdir(parents=True, exist_ok=True)
+    write_bytes(page, rendered("studies.paper", "comparison.md.j2", **comparison).encode())
+    write_json(record, comparison)
+    return [page, record]

@@ -1,7 +1,7 @@
 """The commands of the program, in the order of ``walkers --help``.
 
-The module of a command is imported when the command is called: ``walkers --help`` needs this table alone. ``check`` and
-``paper`` have commands of their own.
+The module of a command is imported when the command is called: ``walkers --help`` needs this table alone. ``check``
+has commands of its own.
 """
 
 from __future__ import annotations
@@ -101,12 +101,6 @@ ALL_COMMANDS = (
         _CHECK,
         "walkers.commands.check:check",
         "Check the engine, the contact model, one case, or files. Exit status 1 if something differs.",
-    ),
-    Command(
-        "paper",
-        _CHECK,
-        "walkers.commands.check:paper",
-        "Compare with the published results: figures and numbers.",
     ),
     Command(
         "library",

@@ -1,10 +1,9 @@
-"""Commands that check the program, compare with the paper, calibrate, and show what comes with the program."""
+"""Commands that check the program, calibrate, and show what comes with the program."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
@@ -16,7 +15,6 @@ from walkers.commands.options import (
     At,
     Case,
     Engine,
-    Formats,
     Jobs,
     Json,
     Out,
@@ -31,9 +29,8 @@ from walkers.errors import refused
 if TYPE_CHECKING:
     from walkers.second_engine.lines import Line
 
-# A section does not inherit the heading of its options.
+# It does not inherit the heading of its options.
 check = App(name="check", version_flags=(), group_parameters="Options")
-paper = App(name="paper", version_flags=(), group_parameters="Options")
 
 
 @check.command
@@ -65,21 +62,6 @@ def _print_checked(lines: Sequence[Line], as_json: bool, of: str = "", **more: A
 
     print_as(as_json, lambda: as_dict(lines, **more), lambda: as_text(lines, of))
     return 1 if failures(lines) else 0
-
-
-@check.command
-def literature(*only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAULT_OUT, as_json: Json = False) -> int:
-    """Compare engine and bridge laws with published benchmarks, exact solutions and a second engine.
-
-    Parameters
-    ----------
-    only
-        benchmarks, bridges, crosscheck or experiments; default: all.
-    """
-    from walkers.second_engine.lines import run_checks
-    from walkers.second_engine.literature import LITERATURE
-
-    return _print_checked(run_checks(LITERATURE, out, only, tell), as_json)
 
 
 @check.command
@@ -144,39 +126,6 @@ def library(name: Annotated[str | None, Parameter(name="NAME")] = None, /) -> No
 
     entries = catalogue()
     print(describe_one(entries, name) if name else describe(entries))
-
-
-@paper.command
-def figures(
-    *,
-    out: Out = DEFAULT_OUT,
-    to: Path = Path("figures"),
-    only: list[str] | None = None,
-    formats: Formats = None,
-    jobs: Jobs = None,
-    engine: Engine = None,
-) -> int:
-    """Draw the paper's figures with our results, and write a table of its facts. Missing runs are made first.
-
-    Parameters
-    ----------
-    to
-        Folder to write the figures to.
-    only
-        Draw only the figure with this name, or comparison. Repeatable.
-    """
-    from walkers.paper.make import FORMATS, make_figures
-    from walkers.sweeps.scheduler import Options
-
-    drawn = make_figures(
-        out, to, Options(jobs), only=only or (), formats=formats or FORMATS, progress=True, engine=engine
-    )
-    for name, failures in drawn.failures.items():
-        tell(*(f"{name}: point {failure.point}, {failure.run}: {failure.message}" for failure in failures))
-    tell(*(f"{figure} is left out: {reason}" for figure, reason in drawn.left_out.items()))
-    print_lines(drawn.files)
-    print_lines(f"{agree} of {of} facts agree: {name}" for name, (agree, of) in drawn.counts.items())
-    return 1 if drawn.failures or drawn.left_out else 0
 
 
 def calibrate(

@@ -1,0 +1,34 @@
+"""``python -m studies.literature`` prints published numbers beside those of the engines and the laws."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from walkers import DEFAULT_OUT
+from walkers.commands.options import Json, Out, print_as, tell
+from walkers.main import main, new_app
+
+app = new_app("python -m studies.literature")
+
+
+@app.default
+def literature(*only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAULT_OUT, as_json: Json = False) -> int:
+    """Compare engine and bridge laws with published benchmarks, exact solutions and a second engine.
+
+    Parameters
+    ----------
+    only
+        benchmarks, bridges, crosscheck or experiments; default: all.
+    """
+    from studies.literature.checks import LITERATURE
+    from walkers.second_engine.lines import as_dict, as_text, failures, run_checks
+
+    lines = run_checks(LITERATURE, out, only, tell)
+    print_as(as_json, lambda: as_dict(lines), lambda: as_text(lines))
+    return 1 if failures(lines) else 0
+
+
+if __name__ == "__main__":
+    main(app=app)
