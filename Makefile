@@ -37,7 +37,7 @@ pile: setup ## Shake the small pile until a cluster climbs (or PILE=pile-fig1a):
 
 .PHONY: figures
 figures: setup .venv/with-theory ## The paper's figures, and its facts beside ours, in figures/ (runs what is missing)
-	@$(WALKERS) paper figures --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
+	@.venv/bin/python -m studies.paper --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
 .PHONY: calibrate
 calibrate: setup .venv/with-calibrate ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
@@ -75,7 +75,7 @@ audit: setup .venv/with-check ## Prove what the installed engine does, beside a 
 
 .PHONY: validate
 validate: setup .venv/with-check ## Check it against published benchmarks, exact solutions and a second engine (under ten minutes)
-	@$(WALKERS) check literature --out $(OUT)
+	@.venv/bin/python -m studies.literature --out $(OUT)
 
 .PHONY: docs-pictures
 docs-pictures: setup .venv/with-dev ## Make what docs/ shows and is not of today's parameters: pictures, tables, outputs, numbers (ONLY=fig2: that)
@@ -89,12 +89,12 @@ docs: setup .venv/with-docs ## Build the documentation into build/site, to be op
 .PHONY: paper
 paper: setup chromium .venv/with-docs .venv/with-dev ## The whole comparison with the paper as one article, build/paper/article.html and .pdf
 	@.venv/bin/python -m docs.illustrations $(OUT) docs
-	@.venv/bin/python docs/article.py build/paper
+	@.venv/bin/python -m studies.article build/paper
 
 .PHONY: joss
-joss: pandoc ## Build the paper about the program (paper/paper.md) into build/joss.html
-	@mkdir -p build && pandoc paper/paper.md --from markdown --citeproc --bibliography paper/paper.bib --standalone \
-	  --metadata author= --output build/joss.html
+joss: pandoc ## Build the paper about the program (docs/joss/paper.md) into build/joss.html
+	@mkdir -p build && pandoc docs/joss/paper.md --from markdown --citeproc --bibliography docs/joss/paper.bib \
+	  --standalone --metadata author= --output build/joss.html
 	@echo "open build/joss.html"
 
 .PHONY: bench

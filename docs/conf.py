@@ -24,7 +24,7 @@ extensions = [
     *("sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex"),
     *("mathml", "generated", "texts"),  # docs/_ext
 ]
-exclude_patterns = ["_ext", "examples", "gallery/**.ipynb"]
+exclude_patterns = ["_ext", "examples", "gallery/**.ipynb", "joss"]
 default_role = "py:obj"
 nitpicky = False
 

@@ -1,22 +1,27 @@
-"""The page docs/article.md as one HTML file, with its pictures in it, and as PDF: ``python docs/article.py OUT``."""
+"""The article (article.md) as one HTML file with its pictures in it, and as PDF: ``python -m studies.article OUT``."""
 
 from __future__ import annotations
 
 import base64
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Annotated
 
-HERE = Path(__file__).parent
-_OTHERS = "_ext,examples,gallery,explanation,how-to,reference,engine-reports,index.md,tutorial.md,figures/*.md"
-_OPTIONS = {
-    "root_doc": "article",
-    "exclude_patterns": _OTHERS,
-    "extensions": "myst_parser,mathml",
-    "suppress_warnings": "myst.xref_missing",
-}
+from cyclopts import Parameter
+
+from walkers.commands.options import print_lines
+from walkers.errors import refused
+from walkers.files import write_bytes
+from walkers.main import main, new_app
+
+TEXT = Path(__file__).with_name("article.md")
+DOCS = TEXT.parents[1] / "docs"
+TITLE = "Walkers and climbing piles of wet beads"
 _STYLE = """
 body { max-width: 46em; margin: 2em auto; padding: 0 1em; font: 11pt/1.45 serif; }
 img { max-width: 100%; }
@@ -33,28 +38,64 @@ a { color: inherit; text-decoration: none; }
 _PAGE = '<!doctype html><html lang="en"><meta charset="utf-8"><title>{}</title><style>{}</style>{}</html>'
 
 
-def article(to: Path) -> list[Path]:
-    """Write ``article.html`` and ``article.pdf`` into a folder."""
+app = new_app("python -m studies.article")
+
+
+@app.default
+def article(to: Annotated[Path, Parameter(name="OUT")], /) -> None:
+    """Write the whole comparison with the paper into the folder OUT: article.html and article.pdf.
+
+    Parameters
+    ----------
+    to
+        The folder.
+    """
+    if find_spec("sphinx") is None or shutil.which("chromium") is None:
+        raise refused("the article", "needs sphinx and chromium: make paper installs them")
+    if to.exists() and not to.is_dir():
+        raise refused(to, "expected a folder, this is a file")
+    html = to / "article.html"
+    pdf = to / "article.pdf"
+    page = _page()
     to.mkdir(parents=True, exist_ok=True)
+    write_bytes(html, page.encode())
+    write_bytes(pdf, _printed(html))
+    print_lines([html, pdf])
+
+
+def _page() -> str:
+    """The article as HTML, by sphinx with the settings of docs/, of the text alone."""
+    settings = {
+        "root_doc": TEXT.stem,
+        "include_patterns": TEXT.name,
+        "extensions": "myst_parser,mathml",
+        "suppress_warnings": "myst.xref_missing",  # links to pages of docs/
+    }
+    command = [sys.executable, "-m", "sphinx", "-q", "-b", "html", "-c", str(DOCS)]
+    for name, value in settings.items():
+        command.append(f"-D{name}={value}")
     with tempfile.TemporaryDirectory() as work:
-        options = [f"-D{name}={value}" for name, value in _OPTIONS.items()]
-        subprocess.run([sys.executable, "-m", "sphinx", "-q", "-bhtml", *options, str(HERE), work], check=True)
-        text = (Path(work) / "article.html").read_text("utf-8")
-        _, _, body = text.partition('<article class="bd-article">')
+        subprocess.run([*command, str(TEXT.parent), work], check=True)
+        page = (Path(work) / "article.html").read_text("utf-8")
+        _, _, body = page.partition('<article class="bd-article">')
         body, _, _ = body.partition("</article>")
         body = re.sub(r'(?<=src=")[^"]+\.png', lambda match: _inline(Path(work) / match[0]), body)
-    html, pdf = to / "article.html", to / "article.pdf"
-    html.write_text(_PAGE.format("Walkers and climbing piles of wet beads", _STYLE, body), "utf-8")
-    how = ["--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer"]
-    printed = [f"--print-to-pdf={pdf.resolve()}", html.resolve().as_uri()]
-    subprocess.run(["chromium", *how, *printed], check=True, capture_output=True)
-    return [html, pdf]
+    return _PAGE.format(TITLE, _STYLE, body)
 
 
 def _inline(picture: Path) -> str:
     return "data:image/png;base64," + base64.b64encode(picture.read_bytes()).decode()
 
 
+def _printed(html: Path) -> bytes:
+    """A page as PDF."""
+    with tempfile.TemporaryDirectory() as work:
+        pdf = Path(work) / "article.pdf"
+        command = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer"]
+        command += [f"--print-to-pdf={pdf}", html.resolve().as_uri()]
+        subprocess.run(command, check=True, capture_output=True)
+        return pdf.read_bytes()
+
+
 if __name__ == "__main__":
-    for path in article(Path(sys.argv[1])):
-        print(path)
+    main(app=app)
