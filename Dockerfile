@@ -1,11 +1,11 @@
 # The engine, the program and what it needs, at the versions that the tests ran with. From the checkout's top level:
 #
-#   docker build -f containers/Dockerfile --build-arg VERSION=0.1.0+g$(git rev-parse HEAD) -t granular-walkers .
+#   docker build --build-arg COMMIT=$(git rev-parse HEAD) -t granular-walkers .
 #   docker run --rm -v "$PWD:/work" granular-walkers run fig1b
 FROM debian:bookworm
 
-# Version and commit, for the manifests of runs: git does not come along.
-ARG VERSION=""
+# The commit, for the manifests of runs: git does not come along.
+ARG COMMIT=""
 
 # The Makefile lists the Debian packages of the engine.
 COPY Makefile /tmp/
@@ -17,7 +17,9 @@ RUN apt-get update \
 COPY . /opt/granular-walkers
 RUN cd /opt/granular-walkers \
  && python3 -m venv /opt/venv \
- && SETUPTOOLS_SCM_PRETEND_VERSION="$VERSION" /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check -c requirements.txt '.[all]' \
+ && version=$(sed -n 's/^fallback_version = "\(.*\)"$/\1/p' pyproject.toml) \
+ && SETUPTOOLS_SCM_PRETEND_VERSION="$version${COMMIT:++g$COMMIT}" \
+    /opt/venv/bin/pip install --no-cache-dir --disable-pip-version-check -c requirements.txt '.[all]' \
  && rm -rf build ./*.egg-info \
  && /opt/venv/bin/walkers show fig1b > /dev/null
 
