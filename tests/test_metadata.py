@@ -3,62 +3,58 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
-from typing import Any
 
-import jinja2
-
-from walkers.files import read_json
+import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 PROJECT = PYPROJECT["project"]
-CODEMETA, ZENODO = read_json(ROOT / "codemeta.json"), read_json(ROOT / ".zenodo.json")
+VERSION = PYPROJECT["tool"]["setuptools_scm"]["fallback_version"]
+LICENCE_OF_PYTHON = PROJECT["license"].split(" AND ")[0]
 
 
-def _found(pattern: str, file: str) -> str:
+def _match(pattern: str, file: str) -> str:
     match = re.search(pattern, (ROOT / file).read_text("utf-8"), re.MULTILINE)
     assert match, f"{pattern} is not in {file}"
     return match[1]
 
 
-def _rendered_recipe() -> list[str]:
-    def load_file_data(name: str, *, from_recipe_dir: bool) -> dict[str, Any]:
-        assert from_recipe_dir
-        return tomllib.loads((ROOT / "recipe" / name).read_text("utf-8"))
-
-    template = jinja2.Template((ROOT / "recipe" / "meta.yaml").read_text("utf-8"))
-    text = template.render(load_file_data=load_file_data, environ={}, PYTHON="python")
-    return [line.strip() for line in text.splitlines()]
-
-
-def test_name_version_licence_and_authors_are_the_same_everywhere() -> None:
-    licences = PROJECT["license"].split(" AND ")
-    version = PYPROJECT["tool"]["setuptools_scm"]["fallback_version"]
-    (author,) = (one["name"] for one in CODEMETA["author"])
-    recipe = _rendered_recipe()
-    for said, expected in (
-        ({CODEMETA["name"], ZENODO["title"], _found("^title: (.*)", "CITATION.cff")}, PROJECT["name"]),
-        ({_found("^title: '([^:]*)", "paper/paper.md")}, PROJECT["name"]),
-        ({CODEMETA["version"], ZENODO["version"], _found("^version: (.*)", "CITATION.cff")}, version),
-        ({_found(r"^## (\S+)", "CHANGELOG.md"), _found(r"VERSION=(\d[\d.]*)\+", "containers/Dockerfile")}, version),
-        ({ZENODO["license"], _found("^license: (.*)", "CITATION.cff")}, licences[0]),
-        ({*(one["name"] for one in ZENODO["creators"]), _found("^  - name: (.*)", "CITATION.cff")}, author),
-        ({_found("^  - name: (.*)", "paper/paper.md")}, author),
-        ({CODEMETA["description"].split(":")[0]}, PROJECT["description"]),
-    ):
-        assert said == {expected}
-    assert [Path(one).name for one in CODEMETA["license"]] == licences
-    assert {f"name: {PROJECT['name']}", f'version: "{version}"', f"license: {PROJECT['license']}"} <= set(recipe)
+@pytest.mark.parametrize(
+    ("pattern", "file", "expected"),
+    [
+        ("^title: (.*)", "CITATION.cff", PROJECT["name"]),
+        ("^title: '([^:]*)", "docs/joss/paper.md", PROJECT["name"]),
+        ("^version: (.*)", "CITATION.cff", VERSION),
+        ("^license: (.*)", "CITATION.cff", LICENCE_OF_PYTHON),
+    ],
+)
+def test_name_version_and_licence_are_the_same_everywhere(pattern: str, file: str, expected: str) -> None:
+    assert _match(pattern, file) == expected
 
 
-def test_the_recipe_needs_what_the_package_needs() -> None:
-    recipe = _rendered_recipe()
-    needed = recipe[recipe.index("run:") + 1 : recipe.index("test:")]
-    assert [one.removeprefix("- ").replace(" ", "") for one in needed if one][1:] == PROJECT["dependencies"]
+def test_a_container_has_the_version_of_the_package() -> None:
+    command = _match(r"version=\$\((.*)\)", "Dockerfile")
+    printed = subprocess.run(command, shell=True, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert printed == f"{VERSION}\n"
+
+
+def test_both_papers_name_the_same_authors() -> None:
+    assert _match("^  - name: (.*)", "docs/joss/paper.md") == _match("^  - name: (.*)", "CITATION.cff")
 
 
 def test_the_site_is_built_with_the_packages_of_the_makefile() -> None:
-    packages = _found(r"apt_packages: \[(.*)\]", ".readthedocs.yaml").split(", ")
-    assert packages == _found("^ENGINE := (.*)", "Makefile").split()
+    packages = _match(r"apt_packages: \[(.*)\]", ".readthedocs.yaml").split(", ")
+    assert packages == _match("^ENGINE := (.*)", "Makefile").split()
+
+
+@pytest.mark.parametrize("room", ["inputs", "templates", "runner", "postprocess"])
+def test_a_link_at_the_top_refuses_to_be_a_second_copy_of_a_package(room: str) -> None:
+    assert (ROOT / room).resolve() == ROOT / "walkers" / room
+    command = [sys.executable, "-c", f"import walkers.{room}; import {room}"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    message = f"ImportError: {room} is a link to the package walkers.{room}: import walkers.{room}"
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (1, message)
