@@ -65,7 +65,7 @@ build/integrators: walkers/theory/stepping.py walkers/second_engine/kernels.py
 	@{ $(WALKERS) show fig1b --theory; .venv/bin/pytest -q tests/test_check.py -k momentum; } > /dev/null && touch $@
 
 .PHONY: test-slow
-test-slow: setup chromium paraview .venv/with-notebooks ## Run what `make test` leaves out: what only a release needs
+test-slow: setup chromium paraview .venv/with-notebooks .venv/with-docs ## Run what `make test` leaves out: what only a release needs
 	.venv/bin/python tests/tools/plant_faults.py check
 	.venv/bin/pytest -q -n 2 -m slow
 

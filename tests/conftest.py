@@ -6,6 +6,7 @@ import copy
 import fcntl
 import io
 import os
+import runpy
 import shutil
 import signal
 import subprocess
@@ -333,23 +334,34 @@ def wait_for(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T:
     raise AssertionError("waited in vain")
 
 
-def call(*arguments: str, check: bool = False, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
+def call(
+    *arguments: str, check: bool = False, folder: Path | None = None, study: str | None = None
+) -> subprocess.CompletedProcess[str]:
     """What the program does with these arguments, without the half second that a process of its own takes.
+
+    With a ``study``, such as ``studies.paper``, what ``python -m`` does with that module.
 
     Its warnings are those of a process of its own, and the handlers that it sets are taken back. Where signals, pipes
     or the interpreter's end matter, tests start `PROGRAM`.
     """
     out, errors = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    argv = sys.argv
     handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
     with redirect_stdout(out), redirect_stderr(errors), chdir(folder or "."), warnings.catch_warnings():
         warnings.resetwarnings()
         for kind in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
             warnings.simplefilter("ignore", kind)
         try:
-            main([*arguments])
+            if study:
+                sys.argv = [study, *arguments]
+                warnings.filterwarnings("ignore", ".*unpredictable", RuntimeWarning)  # a test may have imported it
+                runpy.run_module(study, run_name="__main__")
+            else:
+                main([*arguments])
         except SystemExit as end:
             status = end.code
         finally:
+            sys.argv = argv
             for number, handler in handlers.items():
                 signal.signal(number, handler)
     told = [stream.buffer.getvalue().decode() for stream in (out, errors)]  # type: ignore[attr-defined]

@@ -345,7 +345,6 @@ COMMANDS: list[tuple[str, str]] = [
     ("check fig1b --without magic", "--without magic: expected one of"),
     *((f"{command} --engine /nowhere", "--engine /nowhere: expected the name or path of a liggghts binary")
       for command in ("run fig1b", "check engine", "sweep mine.toml")),
-    ("paper figures --only fig9", "fig9"),
     # Mistyped names
     ("--libary", 'Unknown command "--libary"'),
     ("new {case}", "exists already"),

@@ -58,7 +58,7 @@ def test_links_of_a_page_lead_somewhere(page: Path) -> None:
 
 
 _NAME = re.compile(r"(?<!`)`([A-Za-z_][\w.]*)`(?!`)")
-_OF_PACKAGE = re.compile(r"(?<![\w./-])walkers(?:\.[A-Za-z_]\w*)+")
+_OF_PACKAGE = re.compile(r"(?<![\w./-])(?:walkers|studies)(?:\.[A-Za-z_]\w*)+")
 _FILES = ("pvd", "parquet", "sif", "def", "css")
 """Suffixes of files that are named ``walkers``."""
 _ERRORS = ("walkers.errors.", "walkers.runner.failures.")
@@ -81,7 +81,7 @@ def is_there(name: str) -> bool:
 def test_names_in_docstrings_are_there() -> None:
     """Those in backquotes: names in the code of the file, of a module beside it, of an error, or a full path."""
     wrong, count = [], 0
-    for file in sorted((ROOT / "walkers").rglob("*.py")):
+    for file in sorted([*(ROOT / "walkers").rglob("*.py"), *(ROOT / "studies").rglob("*.py")]):
         module = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
         homes = ("", f"{module}.", f"{module.rpartition('.')[0]}.", "builtins.", *_ERRORS)
         nodes = [*ast.walk(ast.parse(file.read_text("utf-8")))]
@@ -98,7 +98,10 @@ def test_names_in_docstrings_are_there() -> None:
 
 
 def test_names_of_the_package_on_pages_and_in_templates_are_there() -> None:
-    places = {ROOT: ("README.md", "CONTRIBUTING.md", "walkers/**/*.j2"), DOCS: ("**/*.md", "**/*.rst")}
+    places = {
+        ROOT: ("README.md", "CONTRIBUTING.md", "walkers/**/*.j2", "studies/**/*.j2", "studies/*.md"),
+        DOCS: ("**/*.md", "**/*.rst"),
+    }
     files = [file for folder, kinds in places.items() for kind in kinds for file in folder.glob(kind)]
     found = {(file, name) for file in files for name in _OF_PACKAGE.findall(file.read_text("utf-8"))}
     named = {(file, name) for file, name in found if name.split(".")[1] not in _FILES}

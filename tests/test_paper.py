@@ -14,7 +14,6 @@ from studies.paper.comparison import _text_of, compare
 from studies.paper.figures import theory_of_cycles
 from studies.paper.make import FIGURES, make_figures
 from studies.paper.sources import NothingFinishedError, Sources, of_facts, ruby, sets, sweep_of
-from tests.conftest import call
 from tests.printed import letters, spoilt
 from walkers.arrays import FloatArray
 from walkers.calibration.observations import numbers_of
@@ -228,12 +227,6 @@ def test_dimers_turn_as_the_pendulum_does_but_as_much_faster_as_their_beads_are_
         solved = solve_ivp(slope, (0.0, theta[-1]), [psi[0], 0.0], t_eval=theta, args=[phase], rtol=1e-8, atol=1e-10)
         turned = (psi[-1] - psi[begin]) / (solved.y[0, -1] - solved.y[0, begin])
         assert turned == pytest.approx(free["rate"] / free["rolling_rate"], rel=0.3)
-
-
-def test_the_program_draws_what_is_asked_for(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("walkers.inputs.tables.run._MOST_CYCLES", 12)  # of 60: Fig. 4b would take them all
-    done = call("paper", "figures", "--only", "fig4", "--format", "svg", "-j", "1", check=True)
-    assert done.stdout.splitlines() == ["figures/fig4.svg"]
 
 
 def test_a_run_that_failed_is_left_out_and_told(tmp_path: Path) -> None:

@@ -87,7 +87,8 @@ def wheel(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
 
     def build(folder: Path) -> None:
         source = folder / "source"
-        shutil.copytree(ROOT / "walkers", source / "walkers", ignore=shutil.ignore_patterns("__pycache__"))
+        for package in ("walkers", "studies"):
+            shutil.copytree(ROOT / package, source / package, ignore=shutil.ignore_patterns("__pycache__"))
         for name in ("pyproject.toml", "README.md", "LICENSE"):
             shutil.copy(ROOT / name, source)
         build = "import setuptools.build_meta as build; print(build.build_{}('..'))"
@@ -116,8 +117,9 @@ def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_wheel_of_the_sdist_holds_all_files_of_the_package(wheel: Path) -> None:
+    """And nothing else: no study."""
     with zipfile.ZipFile(next(wheel.glob("*.whl"))) as packed:
-        held = {one: packed.read(one) for one in packed.namelist() if one.startswith("walkers/")}
+        held = {one: packed.read(one) for one in packed.namelist() if ".dist-info/" not in one}
     files = [path for path in (ROOT / "walkers").rglob("*") if path.is_file() and "__pycache__" not in path.parts]
     assert held == {path.relative_to(ROOT).as_posix(): path.read_bytes() for path in files if path.name[0] != "."}
 

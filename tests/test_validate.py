@@ -63,7 +63,7 @@ def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
         raise EngineFailure("no engine here")
 
     monkeypatch.setitem(checks.LITERATURE, "crosscheck", fail)
-    done = call("check", "literature", "benchmarks", "crosscheck", "--json")
+    done = call("benchmarks", "crosscheck", "--json", study="studies.literature")
     contents = json.loads(done.stdout)
     assert (done.returncode, contents["passed"]) == (1, False)
     *passed, failed = contents["lines"]

@@ -31,7 +31,7 @@ def names_in(tree: ast.AST) -> Iterator[tuple[str | None, int]]:
                 yield name, node.lineno
 
 
-@pytest.mark.parametrize("folder", ["walkers", "docs"])
+@pytest.mark.parametrize("folder", ["walkers", "studies", "docs"])
 def test_identifiers_say_what_they_name(folder: str) -> None:
     files = [file for file in sorted((ROOT / folder).rglob("*.py")) if not {"gallery", "runs"} & {*file.parts}]
     names = [(file, name, line) for file in files for name, line in names_in(ast.parse(file.read_text("utf-8")))]

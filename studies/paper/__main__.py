@@ -32,7 +32,7 @@ def paper(
     only
         Draw only the figure with this name, or comparison. Repeatable.
     """
-    made = make_figures(
+    drawn = make_figures(
         out,
         to,
         Options(jobs),
@@ -41,15 +41,15 @@ def paper(
         engine=engine,
         progress=True,
     )
-    for sweep, failures in made.failures.items():
+    for sweep, failures in drawn.failures.items():
         for failure in failures:
             tell(f"{sweep}: point {failure.point}, {failure.run}: {failure.message}")
-    for figure, reason in made.left_out.items():
+    for figure, reason in drawn.left_out.items():
         tell(f"{figure} is left out: {reason}")
-    print_lines(made.files)
-    for parameters, (agree, number) in made.counts.items():
+    print_lines(drawn.files)
+    for parameters, (agree, number) in drawn.counts.items():
         print(f"{agree} of {number} facts agree: {parameters}")
-    return 1 if made.failures or made.left_out else 0
+    return 1 if drawn.failures or drawn.left_out else 0
 
 
 if __name__ == "__main__":

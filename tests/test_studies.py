@@ -1,0 +1,122 @@
+"""The studies as they are started, ``python -m studies.NAME``, and what they say of bad input."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from docs import tables
+from studies.effects import COMMAND
+from tests.conftest import call
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def start(study: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """A study in a process of its own, at the top of the repository, as `make` starts it."""
+    command = [sys.executable, "-m", study, *arguments]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+def test_literature_prints_published_impacts_beside_ours(tmp_path: Path) -> None:
+    done = start("studies.literature", "benchmarks", "--out", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    first, *_, last = done.stdout.splitlines()
+    passed = re.fullmatch(r"all (\d+) lines pass", last)
+    assert (first, passed is not None) == ("benchmarks", True)
+    assert done.stdout.count("\npass  ") == int(passed[1]) > 55
+    assert "2: magnesium alloy, largest force (published)" in done.stdout
+    assert done.stderr == "walkers: benchmarks\n"
+
+
+def test_paper_draws_what_is_asked_for_from_runs_that_it_makes_once(
+    in_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("walkers.inputs.tables.run._MOST_CYCLES", 12)  # of 60: Fig. 4b would take them all
+    options = ("--only", "fig4", "--format", "svg", "--out", "mine")
+    call(*options, "-j", "1", study="studies.paper", check=True)
+    finished = {path: path.stat().st_mtime_ns for path in Path("mine").glob("*/manifest.json")}
+    assert len(finished) == 2
+    done = call(*options, "--to", "drawn", study="studies.paper", check=True)
+    assert done.stdout == "drawn/fig4.svg\n"
+    assert {path: path.stat().st_mtime_ns for path in Path("mine").glob("*/manifest.json")} == finished
+    assert [path.name for path in Path("figures").iterdir()] == ["fig4.svg"]
+
+
+@pytest.mark.slow
+def test_effects_prints_the_table_of_the_documentation() -> None:
+    """A quarter of a minute: the theory is compiled with a further force."""
+    done = start("studies.effects")
+    assert done.returncode == 0, done.stderr
+    heads, *rows = [re.split(r" {2,}", line) for line in done.stdout.splitlines()]
+    printed = [dict(zip(heads, row, strict=True)) for row in rows]
+    page = ROOT / "docs" / "figures" / "unexplained.md"
+    assert page.read_text("utf-8") == tables.page(COMMAND, printed)
+
+
+@pytest.mark.slow
+def test_article_is_one_file_with_its_pictures_and_a_pdf(tmp_path: Path) -> None:
+    pytest.importorskip("sphinx", reason="the article is made with the packages of `make docs`")
+    done = start("studies.article", str(tmp_path / "new" / "folder"))
+    assert done.returncode == 0, done.stderr
+    html, pdf = (Path(line) for line in done.stdout.splitlines())
+    text = html.read_text("utf-8")
+    pictures = re.findall(r'<img [^>]*src="([^"]{30})', text)
+    assert len(pictures) == (ROOT / "studies" / "article.md").read_text("utf-8").count("![") == 7
+    assert {picture.partition(",")[0] for picture in pictures} == {"data:image/png;base64"}
+    assert text.count("<table") > 5
+    assert "asperities, ten times" in text, "an included table"
+    assert pdf.read_bytes().startswith(b"%PDF-")
+
+
+BAD_INPUT = [
+    ("paper", "--only fig9", '--only: no figure "fig9"; expected one of fig1b, fig2, fig2-threshold, fig3, fig4'),
+    ("paper", "--format gif", "gif"),
+    ("paper", "--to a-file", "--to: expected a folder, a-file is a file"),
+    ("paper", "--engine /nowhere", "--engine /nowhere: expected the name or path of a liggghts binary"),
+    ("paper", "--jobs 0", "--jobs"),
+    ("paper", "fig4", "Unexpected: fig4. See: python -m studies.paper --help"),
+    ("literature", "impacts", "no check 'impacts'; expected one of benchmarks, bridges, crosscheck, experiments"),
+    ("literature", "--out a-file", "a-file"),
+    ("effects", "lift", "Unexpected: lift. See: python -m studies.effects --help"),
+    ("article", "", "OUT"),
+]
+
+
+@pytest.mark.parametrize(("study", "arguments", "message"), BAD_INPUT)
+def test_bad_input_gives_one_message_and_leaves_nothing(
+    study: str, arguments: str, message: str, in_folder: Path
+) -> None:
+    Path("a-file").write_text("mine", encoding="utf-8")
+    done = call(*arguments.split(), study=f"studies.{study}")
+    assert (done.returncode, done.stdout) == (2, "")
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("walkers: ")
+    assert message in line
+    assert [path.name for path in Path().iterdir()] == ["a-file"]
+    assert Path("a-file").read_text("utf-8") == "mine"
+
+
+def test_article_refuses_a_file_as_its_folder(in_folder: Path) -> None:
+    pytest.importorskip("sphinx", reason="without it, this is refused first")
+    Path("a-file").write_text("mine", encoding="utf-8")
+    done = call("a-file", study="studies.article")
+    assert (done.returncode, done.stderr) == (2, "walkers: a-file: expected a folder, this is a file\n")
+
+
+@pytest.mark.parametrize(("study", "package"), [("literature", "numba"), ("effects", "numba"), ("article", "sphinx")])
+def test_a_study_names_the_package_that_it_needs(
+    study: str, package: str, in_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in [name for name in sys.modules if name.startswith(("studies.", "walkers.second_engine"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, package, None)
+    arguments = ["there"] if study == "article" else []
+    done = call(*arguments, study=f"studies.{study}")
+    (line,) = done.stderr.splitlines()
+    assert (done.returncode, f"needs {package}" in line) == (2, True)
+    assert not list(Path().iterdir())
