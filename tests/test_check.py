@@ -21,8 +21,8 @@ from tests.conftest import PROGRAM, SHORT, call, document, make_case, to_toml
 from walkers import Run, run
 from walkers.arrays import FloatArray, Vector
 from walkers.inputs.reading import load_case, shipped
-from walkers.inputs.tables.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.shapes.walls import BOTTOM, Flat, Round, Wall
 from walkers.inputs.toml import read_toml
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import hertz_overlap, reduced_modulus

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from walkers.inputs.reading import load_case
-from walkers.inputs.tables.boundary import Flat
+from walkers.inputs.tables.shapes.walls import Flat
 from walkers.postprocess.measure import clusters
 from walkers.postprocess.measure.clusters import (
     Beads,

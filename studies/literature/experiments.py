@@ -21,9 +21,9 @@ from walkers.api import run
 from walkers.arrays import FloatArray
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import bridge_at_rest, contact_loads, resistances_at_rest
-from walkers.inputs.tables.boundary import Flat, Wall
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import Harmonic
+from walkers.inputs.tables.shapes.walls import Flat, Wall
 from walkers.physics.bridge import Curve, Surfaces
 from walkers.physics.capillary import bead_volume
 from walkers.physics.contact import Impact, reduced_modulus

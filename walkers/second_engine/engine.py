@@ -12,8 +12,8 @@ from scipy.interpolate import CubicSpline
 from walkers.arrays import FloatArray
 from walkers.errors import refused
 from walkers.inputs.resolving.loads import surfaces_of
-from walkers.inputs.tables.boundary import Flat, Round, Wall
 from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.shapes.walls import Flat, Round, Wall
 from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.second_engine import kernels
 from walkers.second_engine.kernels import CELLS, Bridges, Constants, State

@@ -23,8 +23,8 @@ from walkers.arrays import FloatArray, Vector
 from walkers.errors import Stopped
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import surfaces_of
-from walkers.inputs.tables.boundary import BOTTOM, Flat, Round, Wall
 from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.shapes.walls import BOTTOM, Flat, Round, Wall
 from walkers.physics.bridge import Curve, Forces, Surfaces
 from walkers.physics.laws import LAWS, by_name
 from walkers.postprocess.measure.dump import BinaryDump

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from walkers.arrays import Vector
 from walkers.errors import InputError, Problem
 from walkers.inputs.resolving.loads import bridge_at_rest, hop_height, reach
-from walkers.inputs.tables.boundary import Flat, Round
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import AXES, Excitation
 from walkers.inputs.tables.run import limits_of
+from walkers.inputs.tables.shapes.walls import Flat, Round
 from walkers.physics.capillary import bead_volume
 from walkers.physics.laws import LAWS
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
@@ -22,7 +22,7 @@ from walkers.templates.placement import Scene, Surface, place, surface_of
 from walkers.text import rendered
 
 if TYPE_CHECKING:
-    from walkers.inputs.meshes.vessel import Facet
+    from walkers.inputs.tables.shapes.walls import Facet
 
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import cos, inf, radians
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,12 +24,11 @@ from walkers.arrays import FloatArray, IntArray, Vector
 from walkers.inputs.meshes.flat_faces import FlatFaces
 from walkers.inputs.meshes.triangles import SAME_POINT, evaluated, groups_of, signed_distance, within_polygon
 from walkers.inputs.meshes.wall_names import names_of_faces, numbered, span_text
+from walkers.inputs.tables.shapes.walls import Facet, Half
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-Half = tuple[Vector, Vector, float]
-"""A point, a direction and a bound: a place is in it if its offset from the point is above the bound along it."""
 SHARP = radians(44.9)
 """Faces of a convex vessel that turn by less at an edge cannot be planes without end: a bead near one of them would
 have a bridge to the other behind the edge. Its gap there is R/cos - R, at 45° 0.41 R, beyond the reach of bridges."""
@@ -38,41 +37,6 @@ _UPRIGHT = 1e-3  # largest vertical part of a normal
 _CLOSED, _ACROSS = -3e-308, -1e-12  # bounds of halves: the border is in it; triangles of one face overlap (m)
 _NEAR = 0.3  # radii of a bead: how far the engine looks for facets
 _TOUCHING_BEADS = 200  # that stand for all when facets near beads are counted
-
-
-class Facet(NamedTuple):
-    """A part of a surface: ``face``, ``edge`` or ``corner``.
-
-    ``point`` is in it (m); ``along`` is the normal of a face, toward the beads, the direction of an edge, zero of a
-    corner. The nearest point of the surface is in it for beads that are in one of the ``cells``.
-    """
-
-    kind: str
-    point: Vector
-    along: Vector
-    cells: tuple[tuple[Half, ...], ...]
-    name: str
-
-    def away(self, places: FloatArray) -> FloatArray:
-        """Offset of places from the nearest point of its plane, line or corner, of the shape of the places, m."""
-        away, along = places - self.point, np.array(self.along)
-        over: FloatArray = (away @ along)[..., None] * along
-        return over if self.kind == "face" else away - over
-
-    def distances(self, places: FloatArray) -> FloatArray:
-        """Of places, shape (..., 3), m; infinite where another part of the surface is nearer."""
-        within = np.zeros(places.shape[:-1], dtype=bool)
-        for cell in self.cells:
-            points, directions, bounds = (np.array(column) for column in zip(*cell, strict=True))
-            within |= np.all(np.einsum("...hx,hx->...h", places[..., None, :] - points, directions) > bounds, axis=-1)
-        if self.kind == "face":
-            within &= (places - self.point) @ np.array(self.along) > 0.0
-        return np.where(within, np.linalg.norm(self.away(places), axis=-1), inf)
-
-    def normals(self, places: FloatArray) -> FloatArray:
-        """Unit vectors away from it, of the shape of the places."""
-        away = self.away(places)
-        return np.asarray(away / np.linalg.norm(away, axis=-1, keepdims=True))
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from numpy.random import default_rng
 from walkers.errors import unusable
 from walkers.inputs.resolving.loads import contact_loads
 from walkers.inputs.tables.bodies import Mixture, Walkers
-from walkers.inputs.tables.boundary import FLOOR, LOOSE, Boundary
+from walkers.inputs.tables.boundary import LOOSE, Boundary
+from walkers.inputs.tables.shapes.walls import FLOOR
 
 if TYPE_CHECKING:
     from walkers.inputs.tables.case import Case

@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import lru_cache
 from itertools import count
 from math import ceil, cos, degrees, inf, pi, sin, sqrt
-from typing import Annotated, Any, Literal, NamedTuple, TypeAlias
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -15,58 +15,17 @@ from walkers.arrays import FloatArray, Vector
 from walkers.errors import Problem
 from walkers.inputs import units
 from walkers.inputs.config_table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key, within
-from walkers.inputs.meshes.vessel import Facet, Vessel
+from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.meshes.vessel_planes import vessel_between
-from walkers.inputs.meshes.wall_names import FLOOR_NAME, names_of_faces
+from walkers.inputs.meshes.wall_names import names_of_faces
+from walkers.inputs.tables.shapes.walls import BOTTOM, FLOOR, Flat, Round, Wall
 
-FLOOR = FLOOR_NAME
 LOOSE = 1.03
 """Pitch of the places from which beads are poured, in diameters of the largest bead."""
 _SLOPE = f'{units.NOT_NEGATIVE}; boundary.uphill = "180 deg" turns the slope'
 _LEAST = 1e-13
 _PLACES_AT_ONCE = 5000  # from which beads are poured, whose distances from walls are found together
 _RIM = 2e-4  # m; the simulation box of a container reaches this far beyond its walls
-
-
-class Flat(NamedTuple):
-    """A plane: point (m), unit normal toward the beads, name."""
-
-    point: Vector
-    normal: Vector
-    name: str = FLOOR
-
-    def distances(self, places: FloatArray) -> FloatArray:
-        """Of places, shape (..., 3), m."""
-        distances: FloatArray = (places - self.point) @ self.normal
-        return distances
-
-    def normals(self, places: FloatArray) -> FloatArray:
-        """Unit vectors away from it, of the shape of the places."""
-        return 0.0 * places + self.normal
-
-
-class Round(NamedTuple):
-    """Inside of a vertical cylinder around the origin: radius (m), name."""
-
-    radius: float
-    name: str = "side"
-
-    def distances(self, places: FloatArray) -> FloatArray:
-        """Of places, shape (..., 3), m."""
-        distances: FloatArray = self.radius - (places[..., 0] ** 2 + places[..., 1] ** 2) ** 0.5
-        return distances
-
-    def normals(self, places: FloatArray) -> FloatArray:
-        """Unit vectors toward the axis, of the shape of the places."""
-        normals: FloatArray = (
-            places * (-1.0, -1.0, 0.0) / np.maximum(self.radius - self.distances(places), 1e-300)[..., None]
-        )
-        return normals
-
-
-Wall: TypeAlias = Flat | Round | Facet
-BOTTOM = Flat((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-"""The floor of all boundaries with a floor, in their own frame."""
 
 
 class Layer(NamedTuple):

@@ -24,8 +24,8 @@ from typing import Any
 import numpy as np
 
 from walkers.arrays import BoolArray, FloatArray, IntArray
-from walkers.inputs.tables.boundary import FLOOR as FLOOR_NAME
-from walkers.inputs.tables.boundary import Wall
+from walkers.inputs.tables.shapes.walls import FLOOR as FLOOR_NAME
+from walkers.inputs.tables.shapes.walls import Wall
 from walkers.postprocess.measure.motion import FLOOR, Bridges
 from walkers.postprocess.measure.tables import Columns, columns_of
 

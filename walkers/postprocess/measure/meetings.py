@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from walkers.arrays import BoolArray, FloatArray, IntArray
-from walkers.inputs.tables.boundary import FLOOR
 from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.shapes.walls import FLOOR
 from walkers.postprocess.measure.clusters import connected
 from walkers.postprocess.measure.motion import Bridges, Motion
 from walkers.postprocess.measure.numbers import Measured

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.arrays import FloatArray, IntArray
-from walkers.inputs.tables.boundary import Flat, Round
 from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.shapes.walls import Flat, Round
 from walkers.physics.capillary import bridge_volume
 from walkers.postprocess.measure.motion import Motion, read_bridges
 

@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from walkers.arrays import FloatArray, IntArray
 from walkers.errors import refused
-from walkers.inputs.tables.boundary import Flat, Round
 from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.shapes.walls import Flat, Round
 from walkers.postprocess.measure import piles
 from walkers.postprocess.measure.motion import Motion, between, visible_displacement
 from walkers.postprocess.show.necks import BLUE, NO_BRIDGES, OPACITY, at_front_walls, ends_of, necks_of, triangles_of
