@@ -13,7 +13,7 @@ from walkers.arrays import FloatArray
 from walkers.errors import refused
 from walkers.inputs.resolving.loads import surfaces_of
 from walkers.inputs.tables.case import Case
-from walkers.inputs.tables.shapes.walls import Flat, Round, Wall
+from walkers.inputs.tables.shapes.walls import KernelRow, Wall
 from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.second_engine import kernels
 from walkers.second_engine.kernels import CELLS, Bridges, Constants, State
@@ -51,8 +51,6 @@ class SecondEngine:
         clock: int = 0,
         without: Collection[str] = (),
     ) -> None:
-        if case.boundary.triangles and not walls:
-            raise refused(case.name, "boundary.mesh: expected a vessel of planes; the second engine knows no facets")
         self.clock = clock
         radius = np.ascontiguousarray(radius, dtype=np.float64)
         self.constants = _constants(case, radius, walls or case.boundary.walls, without)
@@ -124,6 +122,16 @@ def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridge
     return Bridges(spans, splines * acts, kind.astype(np.int64), between, volumes, steps, full, liquid)
 
 
+def _rows_of(case: Case, walls: Sequence[Wall]) -> list[KernelRow]:
+    rows = []
+    for wall in walls:
+        row = wall.kernel_row()
+        if row is None:
+            raise refused(case.name, "boundary.mesh: expected a vessel of planes; the second engine knows no facets")
+        rows.append(row)
+    return rows
+
+
 def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: Collection[str]) -> Constants:
     contact = case.contact
     modulus, ratio, loss = contact.youngs_modulus, contact.poissons_ratio, log(contact.restitution)
@@ -138,15 +146,15 @@ def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: C
         course = np.zeros((len(times), 3))
         for direction, moved in case.excitation.motions(times):
             course -= np.outer(moved[2], direction)
-    none, bridges, skin = (0.0, 0.0, 0.0), _bridges(case, radius, without), _SKIN * float(radius.min())
-    flat = [(wall.point, wall.normal) if isinstance(wall, Flat) else (none, none) for wall in walls]
+    bridges, skin = _bridges(case, radius, without), _SKIN * float(radius.min())
+    rows = _rows_of(case, walls)
     return Constants(
         step=case.run.time_step,
         radius=radius,
         mass=4.0 / 3.0 * pi * radius**3 * case.beads.density,
-        point=np.array([point for point, _ in flat]).reshape(-1, 3),
-        normal=np.array([normal for _, normal in flat]).reshape(-1, 3),
-        hollow=np.array([wall.radius if isinstance(wall, Round) else 0.0 for wall in walls]),
+        point=np.array([row.point for row in rows]).reshape(-1, 3),
+        normal=np.array([row.normal for row in rows]).reshape(-1, 3),
+        hollow=np.array([row.radius for row in rows]),
         gravity=np.array(case.gravity_vector) * gravity,
         harmonics=np.array(waves if drive else (), dtype=np.float64).reshape(-1, 6),
         course=course,

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil, inf, prod, sqrt
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from walkers.arrays import Vector
 from walkers.errors import InputError, Problem
@@ -14,15 +14,11 @@ from walkers.inputs.resolving.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import AXES, Excitation
 from walkers.inputs.tables.run import limits_of
-from walkers.inputs.tables.shapes.walls import Flat, Round
 from walkers.physics.capillary import bead_volume
 from walkers.physics.laws import LAWS
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
 from walkers.templates.placement import Scene, Surface, place, surface_of
 from walkers.text import rendered
-
-if TYPE_CHECKING:
-    from walkers.inputs.tables.shapes.walls import Facet
 
 DECK_NAME = "walker.lig"
 OUTPUT_NAME = "engine.log"
@@ -177,8 +173,9 @@ def compose(plan: Plan) -> Deck:
     record = case.excitation.record
     files |= case.excitation.courses()
     files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
-    facets = [wall for wall in scene.walls if not isinstance(wall, (Flat, Round))]
-    files |= {FACETS_NAME: "".join(map(_facet, facets))} if facets else {}
+    facets = "".join(wall.file_rows() for wall in scene.walls)
+    if facets:
+        files[FACETS_NAME] = facets
     if len(scene.beads) > MOST_CREATED and not plan.restart_from:
         files[BEADS_NAME] = _beads_data(scene, case.beads.density, types=len(surfaces) + 1)
     limits = limits_of(case)
@@ -190,6 +187,7 @@ def compose(plan: Plan) -> Deck:
         scene=scene,
         layout=layout,
         names=_NAMES,
+        wall_words=[words for wall in scene.walls if (words := wall.deck_words())],
         files=files,
         named={},
         printed=PRINTED,
@@ -287,19 +285,6 @@ def _loads(scene: Scene) -> str:
         for bead in scene.beads
         if bead.loading
     )
-
-
-def _facet(facet: Facet) -> str:
-    """A facet as the engine reads it, a line for each cell."""
-
-    def numbers(*values: float) -> str:
-        return " ".join(repr(float(x)) for x in values)
-
-    lines = [f"{facet.kind} {numbers(*facet.point)}  {numbers(*facet.along)}  {len(facet.cells)}\n"]
-    for cell in facet.cells:
-        halves = "  ".join(numbers(*point, *direction, least) for point, direction, least in cell)
-        lines.append(f"{len(cell)}  {halves}\n")
-    return "".join(lines)
 
 
 def _search(plan: Plan) -> dict[str, Any]:

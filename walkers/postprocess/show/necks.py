@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from walkers.arrays import FloatArray, IntArray
 from walkers.inputs.tables.case import Case
-from walkers.inputs.tables.shapes.walls import Flat, Round
 from walkers.physics.capillary import bridge_volume
 from walkers.postprocess.measure.motion import Motion, read_bridges
 
@@ -56,11 +55,7 @@ def ends_of(motion: Motion, place: FloatArray, contacts: IntArray) -> Ends:
     begins, ends = place[contacts[:, 0]], place[contacts[:, 1]]
     for number, wall in enumerate(motion.case.boundary.walls):
         held = contacts[:, 2] == number
-        first = begins[held]
-        if isinstance(wall, (Flat, Round)):
-            ends[held] = first - wall.distances(first)[:, None] * wall.normals(first)
-        else:  # facets are not near all beads
-            ends[held] = first - wall.away(first)
+        ends[held] = wall.nearest_points(begins[held])
     return begins, ends
 
 

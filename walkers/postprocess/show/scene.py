@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from math import ceil, cos, pi, radians, sin
+from math import ceil, cos, radians, sin
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +20,6 @@ import numpy.typing as npt
 from walkers.arrays import FloatArray, IntArray
 from walkers.errors import refused
 from walkers.inputs.tables.case import Case
-from walkers.inputs.tables.shapes.walls import Flat, Round
 from walkers.postprocess.measure import piles
 from walkers.postprocess.measure.motion import Motion, between, visible_displacement
 from walkers.postprocess.show.necks import BLUE, NO_BRIDGES, OPACITY, at_front_walls, ends_of, necks_of, triangles_of
@@ -40,7 +39,6 @@ _LUNES = 6
 _FINE = ((10, 72, (9, 36)), (100, 30, (7, 24)), (500, 18, (5, 12)), (np.inf, 12, (3, 8)))
 """For fewer beads than the first number: cells around a ball; rings and sides of a neck."""
 _FINER = 1.5  # pixels that are drawn over those of the picture, in each direction
-_SIDES = 64  # sides of the prism that is drawn for a cylinder
 _BEYOND = 6.0  # extent of the floor over that of the picture
 _ELEVATION_OF_ONE, _ELEVATION = radians(35.0), radians(60.0)
 """Elevation of the camera above a floor: for one walker seen from its side, and otherwise."""
@@ -288,19 +286,13 @@ def walls_of(motion: Motion) -> list[FloatArray]:
         wide = 1.01 * boundary.width / 2.0  # edges of the prism lie beyond the round wall
         low, high = np.full(3, -wide), np.array([wide, wide, boundary.height])
         inside = np.array([0.0, 0.0, boundary.height / 2.0])
-    planes: list[tuple[Any, Any]] = []
-    for wall in boundary.walls:
-        if isinstance(wall, Flat):
-            planes.append((wall.point, wall.normal))
-        elif isinstance(wall, Round):
-            turns = 2.0 * pi * (np.arange(_SIDES) + 0.5) / _SIDES
-            planes += [(wall.radius * out, -out) for out in np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], 1)]
-    ends = [(low, axis) for axis in np.eye(3)] + [(high, -axis) for axis in np.eye(3)]
-    points, normals = (np.array(vectors) for vectors in zip(*planes, *ends, strict=True))
+    planes = [wall.tangent_planes() for wall in boundary.walls]
+    points = np.concatenate([*(points for points, _ in planes), np.repeat([low, high], 3, axis=0)])
+    normals = np.concatenate([*(normals for _, normals in planes), np.eye(3), -np.eye(3)])
     spaces = np.column_stack([-normals, np.einsum("px,px->p", normals, points)])
     room = HalfspaceIntersection(spaces, inside)
     faces = []
-    for number, normal in enumerate(normals[: len(planes)]):
+    for number, normal in enumerate(normals[:-6]):
         corners = room.intersections[[number in meeting for meeting in room.dual_facets]]
         if len(corners) > 2:
             spokes = corners - corners.mean(axis=0)
