@@ -20,8 +20,8 @@ from walkers.inputs.meshes.mesh_file import MOST_BYTES, read_mesh
 from walkers.inputs.meshes.mesh_surface import vessel_of
 from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.meshes.wall_names import names_of_faces
-from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.shapes.vessel import VesselShape
 from walkers.runner import failures
 from walkers.runner.cost import predicted_seconds
 from walkers.runs.preview import describe, summarise
@@ -454,12 +454,13 @@ def test_layers_of_a_wide_vessel_are_made_when_beads_need_them() -> None:
     assert case.boundary.width == pytest.approx(0.16)
     made: list[FloatArray] = []
 
-    class Counting(Boundary):
+    class Counting(VesselShape):
         def side_clearance(self, places: FloatArray) -> FloatArray:
             made.append(places)
             return super().side_clearance(places)
 
-    counted = Counting.model_construct(**dict(case.boundary))
+    boundary = case.boundary
+    counted = Counting(boundary.width, boundary.height, boundary.planes, boundary.points, boundary.triangles)
     next(iter(counted.layers(0.6e-3, 0.0)))
     assert sum(map(len, made)) < 10_000
 

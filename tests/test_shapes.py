@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from itertools import islice
+from math import radians
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from walkers.arrays import FloatArray
+from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.shapes import walls
+from walkers.inputs.tables.shapes.container import Container
+from walkers.inputs.tables.shapes.registry import SHAPES
 from walkers.inputs.tables.shapes.walls import Facet, Flat, Round, Wall
 
 PACKAGE = Path(walls.__file__).parents[3]
@@ -61,6 +66,69 @@ def test_a_wall_stands_in_the_command_or_in_the_file_of_facets(name: str, words:
     assert WALLS[name].deck_words() == words
     assert bool(WALLS[name].file_rows()) == (not words)
     assert (WALLS[name].kernel_row() is None) == (not words)
+
+
+# --- shapes -----------------------------------------------------------------------------------------------------------
+
+PRISMS = [name for name, shape in SHAPES.items() if issubclass(shape, Container) and shape.sizes]
+SHAPE_TABLES: dict[str, dict[str, float]] = {
+    "plane": {},
+    "channel": {"width": 3e-3},
+    "groove": {"opening": radians(100.0)},
+    **{name: {"width": 4e-3, "height": 3e-3} for name in PRISMS},
+}
+
+
+def boundary_of(name: str) -> Boundary:
+    return Boundary(shape=name, material="glass", **SHAPE_TABLES[name])
+
+
+@pytest.mark.parametrize("name", PRISMS)
+def test_the_cross_section_of_a_container_is_that_between_its_walls(name: str) -> None:
+    """Counted by places on a fine lattice."""
+    boundary = boundary_of(name)
+    line = (np.arange(400) + 0.5) / 400 * 4e-3 - 2e-3
+    places = np.stack(np.meshgrid(line, line, 1e-3), axis=-1).reshape(-1, 3)
+    counted = (boundary.side_clearance(places) > 0.0).mean() * (4e-3) ** 2
+    assert boundary.cross_section == pytest.approx(counted, rel=2e-3)
+    assert boundary.volume(2e-3) == pytest.approx(2e-3 * counted, rel=2e-3)
+
+
+@pytest.mark.parametrize("name", PRISMS)
+def test_beads_are_poured_from_places_within_the_walls(name: str) -> None:
+    """Neighbours do not overlap, wherever they are displaced to, and layers are one upon the other."""
+    largest, boundary = 2e-4, boundary_of(name)
+    first, second = islice(boundary.layers(largest, 0.0), 2)
+    places = np.array([(x, y, first.level) for x, y in first.places])
+    assert len(places) > 20
+    assert (boundary.side_clearance(places) > largest).all()
+    assert second.level - first.level == pytest.approx(2.06 * largest)
+    distances = np.linalg.norm(places[:, None] - places, axis=-1) + np.eye(len(places))
+    assert distances.min() - 2.0 * first.play(largest, largest) > 2.0 * largest * (1.0 - 1e-9)
+
+
+@pytest.mark.parametrize("name", SHAPE_TABLES)
+def test_a_bead_at_rest_touches_the_boundary(name: str) -> None:
+    """At the height at which it rests, its nearest wall is a radius away, and gravity presses it there."""
+    boundary, radius = boundary_of(name), 3e-4
+    place = np.array([0.0, 0.0, boundary.rest_height(radius)])
+    touched = [wall for wall in boundary.walls if wall.distances(place) < 1.01 * radius]
+    assert len(touched) == (2 if name == "groove" else 1)
+    for wall in touched:
+        assert wall.distances(place) == pytest.approx(radius)
+        assert wall.normals(place)[2] > 0.5
+
+
+@pytest.mark.parametrize("name", SHAPE_TABLES)
+def test_walls_in_pictures_are_polygons_that_look_at_the_beads(name: str) -> None:
+    boundary, inside = boundary_of(name), np.array([1e-4, 2e-4, 1e-3])
+    faces = boundary.geometry.outline(np.full(3, -2e-3), np.full(3, 2e-3), inside)
+    assert len(faces) == len(boundary.walls) + (63 if name == "cylinder" else 0)
+    for corners in faces:
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[1])
+        assert normal @ (inside - corners[0]) > 0.0
+        gaps = np.array([wall.distances(corners) for wall in boundary.walls])
+        np.testing.assert_allclose(np.abs(gaps).min(axis=0), 0.0, atol=5e-6)
 
 
 # --- nobody asks which kind it is -------------------------------------------------------------------------------------

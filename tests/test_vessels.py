@@ -19,8 +19,8 @@ from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.standing import standing as starts
 from walkers.inputs.sweep import load_sweep
-from walkers.inputs.tables.boundary import LOOSE
 from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.shapes.shape import LOOSE
 from walkers.inputs.tables.shapes.walls import FLOOR
 from walkers.postprocess.measure.motion import read_bridges
 from walkers.postprocess.show.necks import ends_of

@@ -14,7 +14,6 @@ from numpy.random import default_rng
 from walkers.errors import unusable
 from walkers.inputs.resolving.loads import contact_loads
 from walkers.inputs.tables.bodies import Mixture, Walkers
-from walkers.inputs.tables.boundary import LOOSE, Boundary
 from walkers.inputs.tables.shapes.walls import FLOOR
 
 if TYPE_CHECKING:
@@ -122,7 +121,7 @@ def check_bodies(case: Case) -> Case:
     if case.liquid.conserved and (case.walkers or not boundary.closed):
         raise unusable("liquid.conserved", "expected false: only loose beads in a container share their liquid")
     if mixture is not None:
-        _check_pour(mixture, boundary, _top_of_others(case))
+        boundary.geometry.check_pour(mixture.count, max(mixture.radii), _top_of_others(case))
     if case.placed or case.meets or (case.walkers and not boundary.bare):
         beads = _held(case)
         _check_walls(case, beads)
@@ -140,42 +139,6 @@ def _check_vessel(case: Case) -> None:
         raise unusable(blamed, f"has {walls} faces, edges and corners; expected {most}")
     if case.walkers and boundary.walls[0].name != FLOOR:
         raise unusable(blamed, "has no level floor at its bottom, on which walkers stand; expected [[placed]] beads")
-
-
-def _check_pour(mixture: Mixture, boundary: Boundary, floor: float) -> None:
-    largest = max(mixture.large_radii)
-    if boundary.shape == "vessel":
-        _check_places(mixture, boundary, floor)
-        return
-    if boundary.width < 4.0 * largest:
-        raise unusable("boundary.width", "expected at least two of the large beads side by side")
-    layer = boundary.layer(largest)
-    if layer.tight and boundary.width < 8.0 * largest:
-        raise unusable("boundary.width", "expected at least four of the large beads side by side")
-    layers = -(-mixture.count // len(layer.places)) if layer.places else inf
-    level = floor + layers * 2.0 * LOOSE * max(mixture.radii)
-    if level > 2.0 * boundary.height:  # walls and simulation go on to there
-        needed = f"{level / 2.0 * 1e3:.3g} mm"
-        raise unusable("boundary.height", f"too low for {mixture.count} beads; expected {needed} or more")
-
-
-def _check_places(mixture: Mixture, boundary: Boundary, floor: float) -> None:
-    """Refuse more beads than there are places in a vessel of the user's own, which are counted until they suffice."""
-    room = 0
-    for layer in boundary.layers(max(mixture.radii), floor):
-        room += len(layer.places)
-        if room >= mixture.count:
-            return
-    upto = f"up to twice its height of {1e3 * boundary.height:.4g} mm"
-    if room:
-        fits = f"the vessel has places for {room} beads to be poured from, {upto}"
-        raise unusable("mixture.count", f"{fits}; expected at most {room}")
-    across = f"{2e3 * max(mixture.radii):.4g} mm"
-    none = f"the vessel has no place to pour a bead of {across} from, {upto}"
-    cure = "expected a larger vessel (boundary.scale) or smaller beads"
-    if not boundary.vessel.rims:
-        cure += ", or a vessel that is open at its top"
-    raise unusable("mixture.count", f"{none}; {cure}")
 
 
 class _Held(NamedTuple):
@@ -201,7 +164,7 @@ def _cut_by_walls(case: Case, beads: list[_Held]) -> list[_Held]:
     """The beads that side walls cut, and those of walkers that stand beside the floor of a vessel."""
     places = np.array([bead.place for bead in beads])
     clearances = case.boundary.side_clearance(places)
-    if case.boundary.triangles and case.walkers:
+    if case.walkers:
         clearances = np.where(np.isfinite(case.boundary.walls[0].distances(places)), clearances, -1.0)
     return [bead for bead, clear in zip(beads, clearances, strict=True) if clear < (1.0 - OVERLAP) * bead.radius]
 

@@ -23,9 +23,9 @@ from walkers.inputs.resolving.library import Library, LibraryNumber, unmeasured
 from walkers.inputs.resolving.loads import LARGEST_DELAY, bridge_at_rest, contact_loads, delay_of, dimer_of, reach
 from walkers.inputs.resolving.standing import OVERLAP, check_bodies, overlaps
 from walkers.inputs.tables.bodies import ARRANGEMENTS, MOST_BEADS, Cluster, Walkers, touching
-from walkers.inputs.tables.boundary import Plane
 from walkers.inputs.tables.drive import check_drive, common_frequency, unit_vector
 from walkers.inputs.tables.run import limits_of, with_run
+from walkers.inputs.tables.shapes.vessel import Plane
 from walkers.inputs.tables.shapes.walls import BOTTOM
 from walkers.inputs.units import ACCELERATION, LENGTH, TEMPERATURE, parse_quantity, quantity_text
 from walkers.physics.capillary import DEFAULT_LAW, bridge_volume

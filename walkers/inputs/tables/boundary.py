@@ -1,73 +1,26 @@
-"""Boundaries: planes, channels, grooves, containers, vessels of the user's own (`walkers.inputs.meshes.vessel`)."""
+"""``[boundary]`` of a case file. What a shape is and does stands in `walkers.inputs.tables.shapes`."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
-from itertools import count
-from math import ceil, cos, degrees, inf, pi, sin, sqrt
-from typing import Annotated, Any, Literal, NamedTuple
-
-import numpy as np
+from math import cos, degrees, sin
+from typing import Annotated, Any
 
 from walkers.arrays import FloatArray, Vector
 from walkers.errors import Problem
 from walkers.inputs import units
-from walkers.inputs.config_table import SAME_RUN, Choice, Derived, Filled, Indirect, Table, key, within
+from walkers.inputs.config_table import SAME_RUN, Derived, Filled, Indirect, Table, key, within
 from walkers.inputs.meshes.vessel import Vessel
-from walkers.inputs.meshes.vessel_planes import vessel_between
-from walkers.inputs.meshes.wall_names import names_of_faces
-from walkers.inputs.tables.shapes.walls import BOTTOM, FLOOR, Flat, Round, Wall
+from walkers.inputs.tables.shapes.registry import SHAPES, ShapeName
+from walkers.inputs.tables.shapes.shape import Layer, Shape
+from walkers.inputs.tables.shapes.vessel import GIVEN_BY, Plane, VesselShape
+from walkers.inputs.tables.shapes.walls import Wall
 
-LOOSE = 1.03
-"""Pitch of the places from which beads are poured, in diameters of the largest bead."""
 _SLOPE = f'{units.NOT_NEGATIVE}; boundary.uphill = "180 deg" turns the slope'
 _LEAST = 1e-13
-_PLACES_AT_ONCE = 5000  # from which beads are poured, whose distances from walls are found together
-_RIM = 2e-4  # m; the simulation box of a container reaches this far beyond its walls
-
-
-class Layer(NamedTuple):
-    """A layer of positions from which beads are poured: positions (m), pitch (m), largest displacement; height (m)."""
-
-    places: Sequence[tuple[float, float]]
-    pitch: float
-    tight: bool = False
-    level: float = 0.0
-
-    def play(self, radius: float, largest: float) -> float:
-        """Largest displacement of a bead from its position, m."""
-        return (LOOSE * largest - radius) / 2.0 if self.tight else self.pitch / 2.0 - radius
-
-
-Shape = Literal["plane", "channel", "groove", "box", "cylinder", "octagon", "vessel"]
-SIZES: Mapping[str, Collection[str]] = {
-    "plane": (),
-    "channel": ("width",),
-    "groove": ("opening",),
-    **dict.fromkeys(("box", "cylinder", "octagon"), ("width", "height")),
-    "vessel": (),
-}
-"""Size keys of each shape."""
-_VESSEL = Choice("mesh and scale or planes and height")
-_AREAS = {"box": 1.0, "cylinder": pi / 4.0, "octagon": 2.0 * (sqrt(2.0) - 1.0)}
-"""Of the cross-sections of containers, in squares of their width."""
-_ACROSS = {"-y": (0.0, 1.0), "+y": (0.0, -1.0)}
-_BOX = {"-x": (1.0, 0.0), "+x": (-1.0, 0.0), **_ACROSS}
-_CUT = sqrt(0.5)
-_CORNERS = {"+x+y": (-_CUT, -_CUT), "+x-y": (-_CUT, _CUT), "-x+y": (_CUT, -_CUT), "-x-y": (_CUT, _CUT)}
-_SIDES_OF = {"channel": _ACROSS, "box": _BOX, "octagon": {**_BOX, **_CORNERS}}
-"""Flat side walls by their names: normals in the plane of the floor, from which each is half of the width."""
-
-
-class Plane(Table):
-    """One of ``[[boundary.planes]]``: a point and the normal, toward the beads."""
-
-    point: units.Position = key("A point of the plane.", example=["0 mm", "0 mm", "0 mm"])
-    normal: tuple[units.Number, units.Number, units.Number] = key(
-        "Direction of its normal, toward the beads.", example=[0, 0, 1]
-    )
+_SIZES = ("opening", "width", "height")
 
 
 class Boundary(Table):
@@ -77,7 +30,7 @@ class Boundary(Table):
     is a wall. ``uphill`` of a file is from the direction of the drive, of a resolved case from its x axis toward y.
     """
 
-    shape: Shape = key("Shape of the boundary. See [](../cases.md#boundaries).", "plane")
+    shape: ShapeName = key("Shape of the boundary. See [](../cases.md#boundaries).", "plane")
     material: Annotated[str, SAME_RUN] = key(
         "Material, from the library, or any other name beside all friction coefficients.", ..., "glass"
     )
@@ -106,160 +59,94 @@ class Boundary(Table):
         named = next((name for name in ("mesh", "planes", "scale") if name in given), "")
         shape = str(given.get("shape", "vessel" if named else "plane"))
         if shape == "vessel":
-            yield from cls.problems_of(_VESSEL, given, place)
+            yield from cls.problems_of(GIVEN_BY, given, place)
         elif named:
             yield Problem(within(place, "shape"), None, f"expected none beside {place}.{named}")
             return
-        sizes = ("height",) if "planes" in given else SIZES.get(shape, ())
-        for name in ("opening", "width", "height") if shape in SIZES else ():
+        if shape not in SHAPES:
+            return
+        sizes = ("height",) if "planes" in given else SHAPES[shape].sizes
+        for name in _SIZES:
             if name in sizes and name not in given:
                 yield cls.missing(name, place)
             elif name in given and name not in sizes:
                 yield Problem(within(place, name), None, f"expected none of a {shape}")
 
     @property
-    def closed(self) -> bool:
-        """Whether the boundary is a container for poured beads."""
-        return self.shape == "vessel" or self.shape in _AREAS
+    def geometry(self) -> Shape:
+        """The shape with its sizes."""
+        return _geometry_of(self)
 
     @property
-    def vessel(self) -> Vessel:
-        """The surface of a vessel of the user's own."""
-        return _vessel_of(self)
+    def closed(self) -> bool:
+        """Whether the boundary is a container for poured beads."""
+        return SHAPES[self.shape].closed
 
     @property
     def bare(self) -> bool:
         """Whether the boundary is a floor without side walls."""
-        return self.shape == "plane"
+        return SHAPES[self.shape].bare
+
+    @property
+    def walls(self) -> tuple[Wall, ...]:
+        """The floor first, if there is one, then the side walls."""
+        return self.geometry.walls
+
+    @property
+    def vessel(self) -> Vessel:
+        """The surface of a vessel of the user's own; raises `ValueError` for other shapes."""
+        geometry = self.geometry
+        if not isinstance(geometry, VesselShape):
+            raise ValueError(f"a {self.shape} is no vessel")
+        return geometry.vessel
 
     @property
     def tilted(self) -> str:
         """The tilt as text: ``plane tilted by 60°``; empty if level."""
         return f"{self.shape} tilted by {degrees(self.tilt):.4g}°" if self.tilt else ""
 
-    @property
-    def walls(self) -> tuple[Wall, ...]:
-        """The floor first, if there is one, then the side walls."""
-        if self.triangles:
-            return self.vessel.facets
-        if self.shape == "vessel":
-            first = self.planes[0]
-            level = first.normal[2] > 1.0 - 1e-12 and abs(first.point[2]) < 1e-9
-            names = names_of_faces([plane.normal for plane in self.planes], floor=level)
-            return tuple(Flat(plane.point, plane.normal, name) for plane, name in zip(self.planes, names, strict=True))
-        if self.shape == "groove":
-            across, up = cos(self.opening / 2.0), sin(self.opening / 2.0)
-            return (Flat(BOTTOM.point, (0.0, across, up), "-y"), Flat(BOTTOM.point, (0.0, -across, up), "+y"))
-        half = (self.width or inf) / 2.0
-        if self.shape == "cylinder":
-            return BOTTOM, Round(half)
-        sides = _SIDES_OF.get(self.shape, {})
-        normals = ((name, x, y) for name, (x, y) in sides.items())
-        return BOTTOM, *(Flat((-half * x + 0.0, -half * y + 0.0, 0.0), (x, y, 0.0), name) for name, x, y in normals)
-
-    def damping(self, radius: float) -> float:
-        """Damping of a bead of a radius (m) by the walls that it touches at once, over that by one of them.
-
-        It is the largest eigenvalue of the sum of n nᵀ over their normals n. Neighbouring sides of an octagon (1.7) do
-        not count: the step of loose beads allows for more neighbours (`walkers.inputs.tables.bodies.Mixture.bridged`).
-        """
-        if self.shape == "groove":
-            return 1.0 + abs(cos(self.opening))
-        if self.triangles:  # neighbouring faces turn by a small angle: their normals are nearly the same
-            return 2.0
-        return 2.0 if (self.width or inf) < 2.02 * radius else 1.0
-
-    def room(self, half_x: float, half_y: float, height: float, margin: float, largest: float) -> tuple[Vector, Vector]:
-        """Corners of the simulation box, from half the extent of the paths of beads, height, margin and radius; m."""
-        x, y = half_x + 2.0 * margin, half_y + 2.0 * margin
-        top, below = height + 2.0 * margin, 4.0 * largest
-        if self.shape == "plane":
-            below = margin
-        if self.shape == "channel":
-            y, top = self.width / 2.0 + margin, max(top, self.width)
-        if self.closed:
-            x = y = self.width / 2.0 + _RIM
-            top = 2.0 * self.height
-        return (-x, -y, -below), (x, y, top)
-
     def gravity(self, gravity: float) -> Vector:
         """The acceleration of gravity in the boundary's frame, m/s², of a magnitude (m/s²)."""
         down, press = gravity * _round(sin(self.tilt)), gravity * _round(cos(self.tilt))
         return (-down * _round(cos(self.uphill)), -down * _round(sin(self.uphill)), -press)
 
+    def damping(self, radius: float) -> float:
+        """Damping of a bead by all walls that it touches at once over that by one (`Shape.damping`)."""
+        return self.geometry.damping(radius)
+
+    def room(self, half_x: float, half_y: float, height: float, margin: float, largest: float) -> tuple[Vector, Vector]:
+        """Corners of the simulation box, m (`Shape.room`)."""
+        return self.geometry.room(half_x, half_y, height, margin, largest)
+
     def side_clearance(self, places: FloatArray) -> FloatArray:
-        """Distance of places, (n, 3), from the nearest side wall, (n,), m; in a vessel of facets, negative outside."""
-        if self.triangles:
-            return self.vessel.clearance(places)
-        clearances = places[:, 0] + inf
-        for wall in self.walls:
-            if wall.name != FLOOR:
-                clearances = clearances.clip(max=wall.distances(places))
-        return clearances
+        """Distance of places, (n, 3), from the nearest side wall, (n,), m (`Shape.side_clearance`)."""
+        return self.geometry.side_clearance(places)
 
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
-        """Places about the origin for walkers that stand ``spacing`` (m) apart: a square grid, or a row along x."""
-        columns = 1 if self.shape in ("channel", "groove") else ceil(sqrt(number))
-        rows = ceil(number / columns)
-        cells = (divmod(place, columns) for place in range(number))
-        return [((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing) for row, column in cells]
+        """Places about the origin for walkers that stand ``spacing`` (m) apart (`Shape.grid`)."""
+        return self.geometry.grid(number, spacing)
 
     def rest_height(self, radius: float) -> float:
-        """Height above the origin at which a bead of a radius (m) rests on the floor or on both walls, m."""
-        return radius / sin((self.opening or pi) / 2.0)
+        """Height of the centre of a bead of a radius (m) that rests above the origin, m."""
+        return self.geometry.rest_height(radius)
 
     @property
     def cross_section(self) -> float:
         """Inner cross-section of a container, m²; of a vessel of the user's own, its mean."""
-        return self.volume(self.height) / self.height if self.shape == "vessel" else self.width**2 * _AREAS[self.shape]
+        return self.geometry.cross_section
 
     def volume(self, level: float) -> float:
         """Volume of a container below a level (m), m³."""
-        return self.vessel.volume(level) if self.shape == "vessel" else self.cross_section * level
-
-    def layer(self, largest: float) -> Layer:
-        """Places from which beads up to a radius (m) are poured: a square lattice, without those that walls cut."""
-        across = int(self.width / (2.0 * LOOSE * largest))
-        pitch = self.width / max(across, 1)
-        line = [(index + 0.5) * pitch - self.width / 2.0 for index in range(across)]
-        square = [(x, y) for x in line for y in line]
-        near = (1.0 - 1e-9) * LOOSE * largest
-        room = self.side_clearance(np.array([(x, y, 0.0) for x, y in square]).reshape(-1, 3))
-        places = [place for place, clear in zip(square, room, strict=True) if clear > near]
-        return Layer(places, pitch, tight=self.shape != "box")
+        return self.geometry.volume(level)
 
     def layers(self, largest: float, floor: float) -> Iterator[Layer]:
-        """Layers of such places above a height (m), one upon the other; of a vessel of the user's own up to the top."""
-        if self.shape == "vessel":
-            yield from _layers_in(self, largest, floor)
-            return
-        layer = self.layer(largest)
-        # In this order: another one changes the last digit of heights, and piles are chaotic.
-        yield from (layer._replace(level=(number + 0.5) * 2.0 * LOOSE * largest) for number in count())
+        """Layers of places from which beads up to a radius (m) are poured above a height (m) (`Shape.layers`)."""
+        return self.geometry.layers(largest, floor)
 
 
-@lru_cache(maxsize=16)
-def _vessel_of(boundary: Boundary) -> Vessel:
-    if boundary.triangles:
-        return Vessel(np.array(boundary.points), np.array(boundary.triangles))
-    return vessel_between([(plane.point, plane.normal) for plane in boundary.planes], boundary.height)
-
-
-def _layers_in(boundary: Boundary, largest: float, floor: float) -> Iterator[Layer]:
-    """Layers of a vessel of the user's own, see `Boundary.layers`; a wide layer comes in several strips."""
-    pitch = 2.0 * LOOSE * largest
-    columns = ceil(boundary.width / pitch)
-    line = pitch * (np.arange(columns) - (columns - 1) / 2.0)
-    rows_at_once = max(1, _PLACES_AT_ONCE // columns)
-    levels = (np.arange(max(int((2.0 * boundary.height - floor) / pitch), 0)) + 0.5) * pitch
-    for level in levels.tolist():
-        for first in range(0, columns, rows_at_once):
-            strip = line[first : first + rows_at_once]
-            places = np.stack(np.meshgrid(line, strip, [floor + level]), axis=-1).reshape(-1, 3)
-            clear = np.minimum(boundary.side_clearance(places), places[:, 2])
-            free = places[clear > (1.0 - 1e-9) * LOOSE * largest]
-            if len(free):
-                yield Layer([(x, y) for x, y, _ in free.tolist()], pitch, True, level)
+@lru_cache(maxsize=16)  # the surface of a mesh takes seconds
+def _geometry_of(boundary: Boundary) -> Shape:
+    return SHAPES[boundary.shape].of(boundary)
 
 
 def _round(value: float) -> float:

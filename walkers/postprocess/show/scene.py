@@ -275,30 +275,9 @@ def walls_of(motion: Motion) -> list[FloatArray]:
     The walls of a container end at its rim, unbounded walls around the beads. A cylinder is a prism; a vessel of the
     user's own is its triangles.
     """
-    from scipy.spatial import HalfspaceIntersection
-
-    if motion.case.boundary.shape == "vessel":
-        vessel = motion.case.boundary.vessel
-        return [*vessel.points[vessel.triangles]]
-    boundary, margin, inside = motion.case.boundary, 4.0 * float(motion.radius.max()), motion.position[0, 0]
+    margin = 4.0 * float(motion.radius.max())
     low, high = motion.position.min(axis=(0, 1)) - margin, motion.position.max(axis=(0, 1)) + margin
-    if boundary.closed:
-        wide = 1.01 * boundary.width / 2.0  # edges of the prism lie beyond the round wall
-        low, high = np.full(3, -wide), np.array([wide, wide, boundary.height])
-        inside = np.array([0.0, 0.0, boundary.height / 2.0])
-    planes = [wall.tangent_planes() for wall in boundary.walls]
-    points = np.concatenate([*(points for points, _ in planes), np.repeat([low, high], 3, axis=0)])
-    normals = np.concatenate([*(normals for _, normals in planes), np.eye(3), -np.eye(3)])
-    spaces = np.column_stack([-normals, np.einsum("px,px->p", normals, points)])
-    room = HalfspaceIntersection(spaces, inside)
-    faces = []
-    for number, normal in enumerate(normals[:-6]):
-        corners = room.intersections[[number in meeting for meeting in room.dual_facets]]
-        if len(corners) > 2:
-            spokes = corners - corners.mean(axis=0)
-            around = np.arctan2(spokes @ np.cross(normal, spokes[0]), spokes @ spokes[0])
-            faces.append(corners[np.argsort(around)])
-    return faces
+    return motion.case.boundary.geometry.outline(low, high, motion.position[0, 0])
 
 
 def mesh_of(faces: Sequence[FloatArray]) -> pv.PolyData:
