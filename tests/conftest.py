@@ -25,6 +25,7 @@ from tomli_w import dumps as to_toml
 from walkers import run as run_case
 from walkers.archive.writing import write_archive
 from walkers.cache import make_cache_folder
+from walkers.inputs.case_building import build_case
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import shipped
 from walkers.inputs.sweep import expand
@@ -88,7 +89,7 @@ def document(**changes: Any) -> dict[str, Any]:
 
 def make_case(**changes: Any) -> Case:
     """`document`, resolved."""
-    return Case.read(document(**changes), name="test")
+    return build_case(document(**changes), name="test")
 
 
 def origins(case: Case) -> dict[str, Origin]:
@@ -238,7 +239,7 @@ def brief_pile(**run: Any) -> Case:
     tables = read_toml(shipped("case")["pile-ci"])
     tables["mixture"] |= {"count": 20}
     brief = {"duration": "0.03 s", "time_step": "3 us", "longest_settling": "0.02 s", "segment": "0.01 s"}
-    return Case.read({**tables, "run": {**brief, **run}}, name="brief")
+    return build_case({**tables, "run": {**brief, **run}}, name="brief")
 
 
 HALF = {"duration": "0.1 s", "segment": "0.05 s"}
@@ -252,7 +253,7 @@ def pile_run(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     def make(out: Path) -> None:
         tables = read_toml(shipped("case")["pile-ci"])
         tables["run"] |= HALF
-        assert not run_case(Case.read(tables, name="pile-ci"), out).cached
+        assert not run_case(build_case(tables, name="pile-ci"), out).cached
 
     (directory,) = once("piles", make).glob("pile-ci-*")
     return directory

@@ -20,7 +20,7 @@ from walkers import Run, load_case
 from walkers.archive.contents import Contents
 from walkers.archive.writing import write_archive
 from walkers.files import read_json, write_json
-from walkers.inputs.tables.case import Case
+from walkers.inputs.case_building import build_case
 from walkers.runner.directory import leave_out_dumps
 from walkers.runner.manifest import FileChanged, read_manifest
 from walkers.runner.model_sources import model_version
@@ -172,7 +172,7 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     places = [unpacked / place for place in pd.read_csv(there / "table.csv")["run"]]
     assert [place.name for place in places] == [Path(place).name for place in load(shared / "angles")["run"]]
     for place, angle in zip(places, ("0 deg", "10 deg"), strict=True):
-        assert load_case(place / "base.toml") == Case.read(document(run=SHORT, dimers={"angle": angle}), name="base")
+        assert load_case(place / "base.toml") == build_case(document(run=SHORT, dimers={"angle": angle}), name="base")
     assert list(read_json(unpacked / RECORD)["runs"]) == [f"runs/{place.name}" for place in places]
     assert _verified(there)[0] == "angles: 2 points have a run"
     deck = places[0] / "shared_deck" / "walker.lig"

@@ -14,6 +14,7 @@ import pytest
 
 import walkers
 from tests.conftest import REFERENCE, make_case
+from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.loads import contact_loads
 from walkers.inputs.resolving.standing import standing
@@ -71,7 +72,7 @@ def dimers(replicates: int, **start: Any) -> dict[str, Any]:
 
 def of_tables(*clusters: dict[str, Any], **tables: Any) -> Case:
     """The conditions of Fig. 1b with other tables."""
-    return Case.read({**FIG1B, "clusters": list(clusters), **tables}, name="cluster")
+    return build_case({**FIG1B, "clusters": list(clusters), **tables}, name="cluster")
 
 
 def fig1b(**changes: Any) -> Case:
@@ -136,7 +137,7 @@ SAME: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
 def test_other_words_are_the_same_deck_and_run(name: str) -> None:
     tables, words = SAME[name]
     said = {key: value for key, value in {**tables, **words}.items() if value is not None}
-    cases = [Case.read(one) for one in (tables, said)]
+    cases = [build_case(one) for one in (tables, said)]
     decks = [render_deck(case) for case in cases]
     assert decks[0].text == decks[1].text
     assert decks[0].files == decks[1].files
@@ -173,7 +174,7 @@ def test_a_flat_wall_is_named_by_the_side_on_which_it_stands(shape: str, walls: 
 
 def test_a_mixture_is_poured_from_above_the_walkers() -> None:
     """Their large beads, 1 mm across, are higher than the placed one of 0.8 mm; all poured beads are above both."""
-    kinds = {number: one.beads for number, one in standing(Case.read(EVERYTHING))}
+    kinds = {number: one.beads for number, one in standing(build_case(EVERYTHING))}
     tops = [max(bead.z + bead.radius for bead in beads) for beads in (kinds[0], kinds[2])]
     assert tops == pytest.approx([1e-3, 0.8e-3], rel=1e-3)
     assert min(bead.z - bead.radius for bead in kinds[1]) > 1e-3
@@ -294,7 +295,7 @@ def test_walkers_are_as_fast_as_measured(run_directory: Ran, name: str) -> None:
     keys = {key: value for key, value in changes.items() if key != "drive"}
     case = fig1b(**keys) if of_fig1b else load_case(REFERENCE, keys)
     if "drive" in changes:
-        case = Case.read({**case.document, "drive": changes["drive"]})
+        case = build_case({**case.document, "drive": changes["drive"]})
     result = read(run_directory(case))
     found = {number: 1e3 * result[number] for number in expected}
     assert found == pytest.approx(expected, rel=0.02, abs=0.01)
@@ -403,8 +404,8 @@ def on_a_wall(friction: float = 0.3, **start: Any) -> Case:
     begin = {**START, "spacing": "0.1 m", **start}
     frictions = {f"contact.friction.bead_{other}": friction for other in ("bead", "wall")}
     soft = {**CLIMBER, "run": run, "contact": {**CLIMBER["contact"], "youngs_modulus": "50 MPa"}}
-    case = Case.read(soft, name="climber-dimer")
-    return case.changed({**frictions, **{f"dimers.{key}": value for key, value in begin.items()}})
+    case = build_case(soft, name="climber-dimer")
+    return changed_case(case, {**frictions, **{f"dimers.{key}": value for key, value in begin.items()}})
 
 
 @pytest.mark.parametrize("friction", list(FRICTIONS))
@@ -420,7 +421,7 @@ def test_a_dimer_on_the_axis_climbs_if_friction_suffices(run_directory: Ran, fri
 def test_the_shipped_climber_comes_upright_and_its_posture_is_that_of_the_whole_run(run_directory: Ran) -> None:
     """With its spread of starts, for a fifth of its time; then the same motion, turned."""
     run = {"cycles": 36, "settling_cycles": 24, "samples_per_cycle": 1}
-    upright = run_directory(Case.read({**read_toml(shipped("case")["climber"]), "run": run}, name="climber"))
+    upright = run_directory(build_case({**read_toml(shipped("case")["climber"]), "run": run}, name="climber"))
     result, group = read(upright), read_motion(upright).groups[0]
     assert np.degrees(read_table(upright, "walkers")["start_angle"].abs().max()) > 9.0
     assert result["upright"] == result["climbing"] == result["walkers"] == 6

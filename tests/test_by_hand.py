@@ -13,6 +13,7 @@ import walkers
 from tests.conftest import REFERENCE, SHORT, call, document, make_case, wait_for
 from walkers import run as run_case
 from walkers.errors import InputError
+from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.config_table import changed
 from walkers.inputs.tables.case import Case
 from walkers.runner.directory import FIRST_SEGMENT
@@ -67,7 +68,7 @@ TONES = [
     {"frequency": "80 Hz", "peak_acceleration": "2 g"},
     {"axis": "y", "frequency": "160 Hz", "peak_acceleration": "1 g", "phase": "90 deg"},
 ]
-PEAK = make_case().changed({"drive.gamma0": 0.4}).drive.peak_acceleration
+PEAK = changed_case(make_case(), {"drive.gamma0": 0.4}).drive.peak_acceleration
 LIQUID = {"volume_fraction": 0.01, "contact_angle": "0 deg", "surface_tension": "20 mN/m", "density": "1 g/cm^3"}
 EDITED: dict[str, tuple[dict[str, Any], dict[str, str], dict[str, Any]]] = {
     # Tables of a case, edits of its deck, the same changes of the case.
@@ -124,7 +125,7 @@ def _numbers(case: Case) -> list[float]:
 def test_an_edited_deck_is_another_case(name: str, tmp_path: Path, run_directory: Callable[..., Path]) -> None:
     tables, edits, changes = EDITED[name]
     case, expected = (
-        Case.read(changed(Case, {**document(run=SHORT), **tables}, more), name="test") for more in ({}, changes)
+        build_case(changed(Case, {**document(run=SHORT), **tables}, more), name="test") for more in ({}, changes)
     )
     folder = write_folder(case, tmp_path / "hand").parent
     _edit(folder, **edits)
@@ -135,7 +136,9 @@ def test_an_edited_deck_is_another_case(name: str, tmp_path: Path, run_directory
     assert [one.spacing for one in found.case.walkers] == [one.spacing for one in case.walkers]
     assert found.case.drive.ramp == expected.drive.ramp
     # Its tables are those of a case file.
-    assert _numbers(found.case.changed({"title": "again"}))[:-4] == pytest.approx(_numbers(expected)[:-4], rel=1e-9)
+    assert _numbers(changed_case(found.case, {"title": "again"}))[:-4] == pytest.approx(
+        _numbers(expected)[:-4], rel=1e-9
+    )
     _, told, *_ = found.result.about["by_hand"]
     assert all(re.search(rf"[ :]{parameter} \S+, was [\d.e-]+", told) for parameter in edits)
     assert told.count(", was ") == len(edits)

@@ -16,6 +16,7 @@ import walkers
 from tests.conftest import document, make_case
 from walkers.files import write_json
 from walkers.inputs.axes import Range
+from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import bridge_at_rest, contact_loads
 from walkers.inputs.tables.case import Case
@@ -54,7 +55,7 @@ def case_of(**changes: Any) -> Case:
     """The reference's liquid, contacts and drive with other bodies, boundary or run."""
     tables = {name: table for name, table in document().items() if name not in {"dimers", "boundary", "run"}}
     plate = {"material": "chromium-coated glass"}
-    return Case.read({**tables, "boundary": plate, "run": FEW, **changes}, name="made up")
+    return build_case({**tables, "boundary": plate, "run": FEW, **changes}, name="made up")
 
 
 def resting(case: Case, frames: int | None = None) -> Motion:
@@ -167,7 +168,7 @@ def test_what_show_prints_of_a_case_is_in_its_units() -> None:
 def test_measuring_takes_as_long_as_a_run_has_places_of_beads_in_its_first_attempt() -> None:
     """Of twelve beads of walkers in 20 frames of each of 12 cycles; the beads of a pile have no tables."""
     law = {"liquid.law": "rabinovich"}
-    walkers, pile = load_case("fig1b", law), case_of(**PILE).changed(law)
+    walkers, pile = load_case("fig1b", law), changed_case(case_of(**PILE), law)
     assert (walkers.count, walkers.run.attempts) == (12, (12, 24, 60))
     assert predicted_overhead([walkers, pile]) == pytest.approx(2 * 0.037 + 30e-6 * 12 * 20 * 12)
 
@@ -200,9 +201,9 @@ def test_a_result_rests_on_the_values_of_the_case_that_is_asked_for(tmp_path: Pa
     """Two cases of the same numbers have a run in common; one says a value that the other leaves out."""
     tables = document(run=FEW)
     del tables["contact"]["rolling_friction"]
-    plain = Case.read(tables, name="test")
+    plain = build_case(tables, name="test")
     contact = {**tables["contact"], "rolling_friction": plain.contact.rolling_friction}
-    said = Case.read({**tables, "contact": contact}, name="test")
+    said = build_case({**tables, "contact": contact}, name="test")
     assert said == plain
     walkers.run(plain, tmp_path)
     rests = [walkers.load(case, tmp_path).result.about["rests_on"] for case in (plain, said)]

@@ -20,6 +20,7 @@ import pytest
 from tests.conftest import PROGRAM, SHORT, call, document, make_case, to_toml
 from walkers import Run, run
 from walkers.arrays import FloatArray, Vector
+from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import BOTTOM, Flat, Round, Wall
@@ -182,7 +183,7 @@ def test_piles_agree_until_they_are_chaotic_and_through_a_restart(pile: dict[str
     seed = load_case("pile-ci").run.seed
     assert all(measured[f"start {seed + number}: cycles of the same motion"] >= 1.0 for number in range(2))
     assert [*measured][:3:2] == ["height of the beads", "touching pairs per bead"]
-    first = run(shortened(Case.read(pile, name="pile"), 3), Path("runs"))
+    first = run(shortened(build_case(pile, name="pile"), 3), Path("runs"))
     parts = {name: getattr(first.motion, name)[:-1] for name in ("time", "position", "velocity", "spin", "frames")}
     shaken = replace(first.motion, **parts)
     assert first.cached

@@ -38,6 +38,7 @@ from walkers import run as run_case
 from walkers.archive.writing import write_archive
 from walkers.errors import InputError
 from walkers.files import read_json, write_json
+from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
@@ -525,7 +526,7 @@ def stranger(run_directory: Callable[..., Path], tmp_path: Path) -> Stranger:
 
 def _deck(text: str, stranger: Stranger, folder: Path) -> object:
     tables = document(run=SHORT, beads={"density": "4 g/cm^3"}, title=text)
-    deck = render_deck(_with_texts(Case.read(tables, name=text), text))
+    deck = render_deck(_with_texts(build_case(tables, name=text), text))
     return deck.text, deck.files
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from tests.conftest import call, document, make_case, to_toml
 from walkers import load_case, run
+from walkers.inputs.case_building import changed_case, stored_case
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.motion import boundary_motion
@@ -108,14 +109,14 @@ def test_a_run_has_its_record(tmp_path: Path) -> None:
     first = run(case, tmp_path)
     (tmp_path / "other").mkdir()
     shutil.move(tmp_path / "record.csv", tmp_path / "other" / "renamed.csv")
-    again = run(case.changed({"drive.record": str(tmp_path / "other" / "renamed.csv")}), tmp_path)
+    again = run(changed_case(case, {"drive.record": str(tmp_path / "other" / "renamed.csv")}), tmp_path)
     assert (again.directory, again.cached) == (first.directory, True)
     assert run(recorded(tmp_path, sine(44), repeats=True), tmp_path).directory != first.directory
     shutil.rmtree(tmp_path / "other")
     (tmp_path / "record.csv").unlink()
-    kept = Case.from_dict(first.case.as_dict())
+    kept = stored_case(first.case.as_dict())
     assert kept == first.case
-    assert kept.changed({"run.cycles": 7}).excitation.frequency == pytest.approx(80.0)
+    assert changed_case(kept, {"run.cycles": 7}).excitation.frequency == pytest.approx(80.0)
     assert call("show", str(first.directory), check=True).stdout.count("record") > 1
 
 
@@ -125,7 +126,7 @@ def test_a_sweep_over_records_reads_each_of_them(tmp_path: Path) -> None:
     for count in (44, 48):
         (tmp_path / f"{count}.csv").write_text(sine(count))
     (tmp_path / "records.toml").write_text('case = "case.toml"\n[axes]\n"drive.record" = ["44.csv", "48.csv"]\n')
-    expected = [case.changed({"drive.record": str(tmp_path / f"{count}.csv")}) for count in (44, 48)]
+    expected = [changed_case(case, {"drive.record": str(tmp_path / f"{count}.csv")}) for count in (44, 48)]
     found = load_sweep(tmp_path / "records.toml").cases()
     assert [point.determinants() for point in found] == [of.determinants() for of in expected]
 
@@ -134,11 +135,14 @@ def test_what_shares_a_deck_has_one_record_and_one_ramp(tmp_path: Path) -> None:
     """Walkers with other frictions do, and move as they would alone."""
     other = {"contact.friction.bead_wall": 0.2}
     case = recorded(tmp_path, sine(400), repeats=True, ramp=RAMP)
-    apart = [case.changed({"drive.ramp": [*RAMP[:1], ["0.06 s", 0.75]]}), recorded(tmp_path, sine(400), repeats=True)]
+    apart = [
+        changed_case(case, {"drive.ramp": [*RAMP[:1], ["0.06 s", 0.75]]}),
+        recorded(tmp_path, sine(400), repeats=True),
+    ]
     apart.append(recorded(tmp_path, sine(500), repeats=True, ramp=RAMP))
-    assert sharing_key(case.changed(other)) == sharing_key(case)
+    assert sharing_key(changed_case(case, other)) == sharing_key(case)
     assert len({*map(sharing_key, [case, *apart])}) == 4
-    both = [case, case.changed(other)]
+    both = [case, changed_case(case, other)]
     together, alone = tmp_path / "together", tmp_path / "alone"
     make_runs(both, together, find_engine())
     for one in both:
@@ -158,7 +162,7 @@ def test_cycles_of_records(tmp_path: Path) -> None:
     assert once.excitation.frequency == pytest.approx(74.4, rel=1e-3)  # a third of the way between two lines
     assert once.excitation.cycles == (0.0, pytest.approx(0.2998 * 74.4, rel=1e-3))
     # Left out, a run has all whole cycles of its record, or those of its ramp.
-    ramped = repeats.changed({"drive.ramp": RAMP})
+    ramped = changed_case(repeats, {"drive.ramp": RAMP})
     assert [load_case({**one.document, "run": {}}).run.cycles for one in (once, ramped)] == [22, 5]
     direction = recorded(tmp_path, csv(time, x=tones[0] + np.sin(500.0 * time), y=-np.sin(500.0 * time))).excitation
     assert direction.direction == pytest.approx((0.5**0.5, -(0.5**0.5), 0.0))

@@ -30,6 +30,7 @@ from tests.conftest import (
 )
 from walkers import load_case
 from walkers.files import read_json, scratch_folder, write_json
+from walkers.inputs.case_building import changed_case
 from walkers.inputs.reading import shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.uncertainty import ACCURACY_NAME, SPREAD_NAME, spread_of
@@ -221,7 +222,7 @@ def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
 def test_compared_cases_show_what_follows_from_their_materials() -> None:
     """Friction, roughness, and liquid that only one case has; no defaults of a table that only one has."""
     ruby, cluster = load_case("fig1b"), load_case("cluster")
-    glass = ruby.changed({"beads.material": "glass"})
+    glass = changed_case(ruby, {"beads.material": "glass"})
     text = compare_runs(Side("a", ruby, None), Side("b", glass, None)).text
     cells = {tuple(re.split("  +", line)) for line in text.splitlines()}
     assert cells >= {

@@ -16,6 +16,7 @@ import pytest
 from tests.conftest import REFERENCE, call, document, make_case, origins, to_toml
 from walkers.errors import InputError
 from walkers.inputs import units
+from walkers.inputs.case_building import build_case, changed_case, stored_case
 from walkers.inputs.config_table import changed
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import load_case, shipped
@@ -112,7 +113,7 @@ def test_values_know_where_they_come_from() -> None:
     assert menisci.range == unmeasured()["liquid.meniscus_radius"].range
     assert origins(load_case("fig1b", {"liquid.law": "willett"}))["contact.rolling_friction"].guessed
     # What a case gives is guessed if it is called uncertain.
-    guessed = {key: one.text for key, one in origins(Case.read(GLASS)).items() if one.guessed}
+    guessed = {key: one.text for key, one in origins(build_case(GLASS)).items() if one.guessed}
     unknown = {"contact.restitution": "0.3", "liquid.volume_fraction": "0.01", "liquid.contact_angle": "0 deg"}
     assert guessed == {**unknown, "contact.friction.bead_wall": "0.3"}
 
@@ -131,7 +132,7 @@ def test_what_is_called_uncertain_keeps_where_it_comes_from(tmp_path: Path) -> N
     assert {*ranges} < set(spread_sweep(case, 2).keys)
     # Points of sweeps may leave the range; the case itself may not.
     tables = {**GLASS, "uncertain": {"contact.friction.bead_wall": [0.4, 0.6]}}
-    assert Case.read(tables).contact.friction.bead_wall == 0.3
+    assert build_case(tables).contact.friction.bead_wall == 0.3
     assert load_case(tables, {"contact.friction.bead_wall": 0.4}).contact.friction.bead_wall == 0.4
 
 
@@ -145,7 +146,7 @@ def test_names_and_what_no_law_asks_for_do_not_determine_a_run() -> None:
         run={"settled_below": "1 mm/s"},
     )
     del tables["liquid"]["name"]
-    named = Case.read(tables)
+    named = build_case(tables)
     assert named != case
     assert named.determinants() == case.determinants()
     assert make_case(run={"seed": 2}).determinants() != make_case().determinants()
@@ -154,16 +155,18 @@ def test_names_and_what_no_law_asks_for_do_not_determine_a_run() -> None:
 def test_a_case_is_changed_as_its_file_would_be() -> None:
     """All values follow, with their origins; the case itself stays as it was."""
     case = load_case("fig1b", {"run.cycles": 2, "run.settling_cycles": 0, "dimers.replicates": 1})
-    faster = case.changed({"drive.frequency": "120 Hz", "contact.friction.bead_wall": 0.5, "liquid.name": "Si AK10"})
-    assert (case.drive.frequency, case.changed({})) == (80.0, case)
+    faster = changed_case(
+        case, {"drive.frequency": "120 Hz", "contact.friction.bead_wall": 0.5, "liquid.name": "Si AK10"}
+    )
+    assert (case.drive.frequency, changed_case(case, {})) == (80.0, case)
     assert (faster.drive.frequency, faster.contact.friction.bead_wall, faster.name) == (120.0, 0.5, "fig1b")
     assert faster.run.period == pytest.approx(1.0 / 120.0, rel=1e-12)
     assert faster.liquid.dynamic_viscosity == pytest.approx(9.3e-3)
     assert origins(faster)["contact.friction.bead_wall"].word == "given"
-    assert faster == Case.read(faster.document, name="fig1b")
+    assert faster == build_case(faster.document, name="fig1b")
     assert "<tr><td>drive.frequency</td><td>80 Hz</td><td>given</td><td></td></tr>" in case._repr_html_()
     # What says the same in other words goes, in one of several harmonics as well.
-    assert case.changed({"drive.gamma0": 0.5}).drive.peak_acceleration > 50.0
+    assert changed_case(case, {"drive.gamma0": 0.5}).drive.peak_acceleration > 50.0
     first, last = ({f"drive.harmonics[{number}].peak_acceleration": "2 g"} for number in (0, 1))
     tables = {"drive": {"harmonics": [{"gamma0": 0.4, "axis": "x"}, {"gamma0": 0.2}]}}
     assert changed(Case, tables, last)["drive"]["harmonics"][1] == {"peak_acceleration": "2 g"}
@@ -187,15 +190,15 @@ ODD: dict[str, dict[str, Any]] = {
 @pytest.mark.parametrize("name", [*sorted(shipped("case")), *ODD])
 def test_a_case_is_kept_as_json(name: str) -> None:
     """With all of its values, where they are from, and its file."""
-    case = Case.read({**document(), **ODD[name]}, name=name) if name in ODD else load_case(name)
-    again = Case.from_dict(json.loads(json.dumps(case.as_dict())))
+    case = build_case({**document(), **ODD[name]}, name=name) if name in ODD else load_case(name)
+    again = stored_case(json.loads(json.dumps(case.as_dict())))
     assert (again, again.name, again.document) == (case, case.name, case.document)
     assert again.determinants() == case.determinants()
     assert (again.origins, again.sources) == (case.origins, case.sources)
     assert [one.value for one in again.origins] == [one.value for one in case.origins]
     for damaged in ([], {**case.as_dict(), "document": 3}, {**case.as_dict(), "beads": {}}):
         with pytest.raises(ValueError, match=":"):
-            Case.from_dict(damaged)  # type: ignore[arg-type]
+            stored_case(damaged)  # type: ignore[arg-type]
 
 
 def test_the_schema_refuses_what_the_program_refuses(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -299,7 +302,7 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(in_folde
     assert "contact.friction.bead_wall" in varied.keys
     sweep = expand({"case": "mine.toml", "axes": {"dimers.replicates": [1, 2]}}, source="s", name="s", folder=in_folder)
     (in_folder / "library.toml").rename("other.toml")
-    again = Case.read(Case.from_dict(case.as_dict()).document, name="mine")
+    again = build_case(stored_case(case.as_dict()).document, name="mine")
     assert (again, again.determinants()) == (case, case.determinants())
     spread = expand(varied.file, source="s", name="s", base=(varied.case_name, varied.base))
     assert {point.beads.density for points in (sweep, spread) for point in points.cases()} == {2450.0}
@@ -316,7 +319,7 @@ def test_a_pair_of_surfaces_is_found_in_either_order(materials: list[str]) -> No
     for bead, wall in (("my beads", "glass"), ("glass", "my beads")):
         tables = {**document(beads={"material": bead}, boundary={"material": wall}), "library": library}
         del tables["contact"]["friction"]
-        assert Case.read(tables, name="pair").contact.friction.bead_wall == 0.21
+        assert build_case(tables, name="pair").contact.friction.bead_wall == 0.21
 
 
 def test_ranges_of_roughness_end_where_a_case_is_refused() -> None:
@@ -340,7 +343,7 @@ def test_beads_beyond_the_capillary_length_that_the_liquid_does_not_hold_are_rep
     mass = 4.0e3 * 4.0 / 3.0 * pi * 3e-3**3
     pull = 4.0 * pi * 19.2e-3 * 3e-3  # of a perfectly wetted bead on a plane, at most
     assert float(weight.partition("weigh ")[2].split()[0]) == pytest.approx(mass * 9.81 / pull, rel=0.1)
-    assert gravity_warnings(case.changed({"environment.gravity": "0 m/s^2"})) == []
+    assert gravity_warnings(changed_case(case, {"environment.gravity": "0 m/s^2"})) == []
 
 
 def test_beads_that_are_heavier_than_the_pull_of_their_bridge_alone_are_reported() -> None:

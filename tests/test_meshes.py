@@ -15,12 +15,12 @@ import walkers
 from tests.test_vessels import bowl, cuboid, poured, prism, write
 from walkers.arrays import FloatArray
 from walkers.errors import InputError
+from walkers.inputs.case_building import build_case
 from walkers.inputs.meshes.flat_faces import LEAST_STEP
 from walkers.inputs.meshes.mesh_file import MOST_BYTES, read_mesh
 from walkers.inputs.meshes.mesh_surface import vessel_of
 from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.meshes.wall_names import names_of_faces
-from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.vessel import VesselShape
 from walkers.runner import failures
 from walkers.runner.cost import predicted_seconds
@@ -286,7 +286,7 @@ def test_beads_are_poured_into_a_jar_above_its_opening_alone(tmp_path: Path) -> 
     assert (vessel.clearance(above) > 0.0).tolist() == [True, False, False]
     below = np.array([[5e-3, 0.0, 6e-3], [0.0, 0.0, 15e-3]])
     np.testing.assert_allclose(vessel.clearance(below), [1e-3, 4e-3], rtol=1e-9)
-    case = Case.read(poured(mesh=str(DATA / "jar-upright.stl"), scale="1 mm"))
+    case = build_case(poured(mesh=str(DATA / "jar-upright.stl"), scale="1 mm"))
     largest = max(case.mixture.radii) if case.mixture else 0.0
     for layer in case.boundary.layers(largest, 0.0):
         if layer.level > 16e-3:
@@ -296,7 +296,7 @@ def test_beads_are_poured_into_a_jar_above_its_opening_alone(tmp_path: Path) -> 
 def test_a_vessel_without_room_for_a_bead_says_so(tmp_path: Path) -> None:
     closed = write(tmp_path, cuboid(np.zeros(3), np.array([8e-3, 8e-3, 1e-3]), -1.0))
     with pytest.raises(InputError, match=r"no place to pour a bead of 1.\d+ mm from, .* open at its top") as refusal:
-        Case.read(poured(mesh=closed, scale="1 mm"))
+        build_case(poured(mesh=closed, scale="1 mm"))
     assert "at most 0" not in str(refusal.value)
 
 
@@ -387,7 +387,7 @@ def test_a_bead_slides_over_a_seam_of_strips(tmp_path: Path) -> None:
         "drive": {"axis": "x", "frequency": "10 Hz", "peak_acceleration": "1 g"},
         "run": {"duration": "0.25 s", "longest_settling": "0.05 s"},
     }
-    done = walkers.run(Case.read(case), tmp_path)
+    done = walkers.run(build_case(case), tmp_path)
     assert 0.5e-3 < done.motion.position[:, 0, 2].max() < 0.523e-3
 
 
@@ -426,7 +426,7 @@ def test_names_of_walls_are_unique() -> None:
 
 
 def text_of(boundary: dict[str, Any]) -> str:
-    lines = describe(summarise(Case.read(poured(**boundary)))).splitlines()
+    lines = describe(summarise(build_case(poured(**boundary)))).splitlines()
     return next(line for line in lines if line.startswith("vessel"))
 
 
@@ -443,14 +443,14 @@ def test_a_run_at_more_facets_takes_longer(tmp_path: Path) -> None:
     """Of the same beads, in bowls of 96 and of 2,700 facets; the facets are most of the time at last."""
     seconds = []
     for rings in (4, 25):
-        case = Case.read(poured(mesh=write(tmp_path, bowl(5e-3, rings)), scale="1 mm"))
+        case = build_case(poured(mesh=write(tmp_path, bowl(5e-3, rings)), scale="1 mm"))
         seconds.append(predicted_seconds(case) / case.run.cycles)
     assert seconds[1] > 3.0 * seconds[0]
 
 
 def test_layers_of_a_wide_vessel_are_made_when_beads_need_them() -> None:
     """Of a box 160 mm wide and 400 mm high there are 17,000 places in a layer, and 40 beads."""
-    case = Case.read(poured(mesh=str(DATA / "open-box.stl"), scale="20 mm"))
+    case = build_case(poured(mesh=str(DATA / "open-box.stl"), scale="20 mm"))
     assert case.boundary.width == pytest.approx(0.16)
     made: list[FloatArray] = []
 
@@ -471,5 +471,5 @@ def test_beads_that_leave_a_vessel_are_not_called_walkers(tmp_path: Path) -> Non
     tables["drive"] = {"axis": "z", "frequency": "80 Hz", "peak_acceleration": "200 g"}
     tables["run"] = {"duration": "0.2 s", "longest_settling": "0.05 s"}
     with pytest.raises((failures.BeadsLost, failures.BeadsOverTheTop), match="left the vessel over its rim") as loss:
-        walkers.run(Case.read(tables), tmp_path)
+        walkers.run(build_case(tables), tmp_path)
     assert "walkers" not in str(loss.value).replace(str(tmp_path), "")

@@ -13,6 +13,7 @@ from tests.conftest import HALF, call
 from tests.printed import spoilt
 from walkers.errors import InputError
 from walkers.files import read_json
+from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.loads import bridge_at_rest, delay_of, delay_of_loose_beads, softness_warning
 from walkers.inputs.tables.case import Case
@@ -37,14 +38,14 @@ def document(case: str = "pile-ci", **changes: dict[str, Any]) -> dict[str, Any]
 
 
 def small(**changes: dict[str, Any]) -> Case:
-    return Case.read(document(**changes), name="pile-ci")
+    return build_case(document(**changes), name="pile-ci")
 
 
 def placed(*beads: tuple[float, float, float], **changes: dict[str, Any]) -> Case:
     """Beads of a radius at x and z, mm, in the box of the shipped cluster."""
     tables = document("cluster", **changes)
     tables["placed"] = [{"radius": f"{r} mm", "at": [f"{x} mm", "0 mm", f"{z} mm"]} for r, x, z in beads]
-    return Case.read(tables, name="cluster")
+    return build_case(tables, name="cluster")
 
 
 def test_a_pile_settles_is_shaken_and_is_whole(pile_run: Path) -> None:
@@ -135,7 +136,7 @@ def test_a_container_holds_its_beads(shape: str, walls: int, tmp_path: Path) -> 
 def test_all_walls_of_a_trough_are_side_walls(tmp_path: Path) -> None:
     """It is two slanted faces without a floor: what touches either is at a wall."""
     tables = document("pile-trough", mixture={"count": 20}, run={"duration": "0.02 s", **QUICK})
-    done = walkers.run(Case.read(tables, name="trough"), tmp_path)
+    done = walkers.run(build_case(tables, name="trough"), tmp_path)
     frames = list(read_bridges(done.motion))
     touched = [bridges.at_walls for bridges in frames]
     assert {0, 1} <= set(touched[-1][1].tolist())

@@ -17,6 +17,7 @@ from tests.conftest import REFERENCE, TINY, document, make_case, to_toml
 from tests.test_inputs import GLASS
 from walkers.errors import InputError
 from walkers.files import read_json
+from walkers.inputs.case_building import build_case
 from walkers.inputs.resolving.library import unmeasured
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.sweep import Sweep, expand, load_sweep
@@ -257,7 +258,7 @@ def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives() -> None:
 
 def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     """Glass on polystyrene at 10 g walks or not as one guesses; the single number, exact to 1e-5, does not say so."""
-    case = Case.read({**GLASS, "run": {"cycles": 6}}, name="guessed")
+    case = build_case({**GLASS, "run": {"cycles": 6}}, name="guessed")
     spread = run_spread(case, runs_folder, Options(2), points=4)
     warned = [run.result.warnings for run in walkers.load(spread.directory).runs if run.result.warnings]
     assert warned == list(spread.doubts)
@@ -300,10 +301,10 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert told.keys() == unmeasured().keys() - {"liquid.meniscus_radius"}  # in place of which there is a fraction
     # It is for its ranges alone, with which a run does not change its name.
     done = walkers.run(
-        Case.read({**case.document, "uncertain": {"contact.friction.bead_wall": [0.2, 0.6]}}), runs_folder
+        build_case({**case.document, "uncertain": {"contact.friction.bead_wall": [0.2, 0.6]}}), runs_folder
     )
     assert "velocity_low" not in done.result
     with pytest.raises(InputError, match=r"uncertain.contact.restitution.*: expected a range that holds"):
-        spread_sweep(Case.read({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside"))
+        spread_sweep(build_case({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside"))
     with pytest.raises(InputError, match="no value is uncertain"):
-        run_spread(Case.read(REFERENCE), runs_folder, Options(2))
+        run_spread(build_case(REFERENCE), runs_folder, Options(2))

@@ -15,10 +15,10 @@ import pytest
 from tests.conftest import brief_pile, call, document, make_case, to_toml
 from tests.test_physics import OWN
 from walkers import run as run_case
+from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.boundary import Boundary
-from walkers.inputs.tables.case import Case
 from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import LAWS, by_name
 from walkers.runner.binary import find_engine
@@ -137,7 +137,7 @@ def test_the_box_of_a_deck_has_room_for_beads_that_are_placed_far_from_the_origi
     tables = document(run={"duration": "0.1 s"}, placed=[{"radius": "0.5 mm", "at": at}])
     for key in ("cycles", "settling_cycles"):
         del tables["run"][key]
-    scene, _ = place((Case.read(tables, name="far"),))
+    scene, _ = place((build_case(tables, name="far"),))
     outer = [scene.lower, scene.upper][sign > 0][axis]
     other = [scene.lower, scene.upper][sign > 0][1 - axis]
     assert 30.5e-3 < sign * outer < 45e-3
@@ -186,7 +186,7 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
     several = document(contact={"rolling_friction": 0.01}, boundary={"tilt": "20 deg"})
     several["drive"] = {"harmonics": [*harmonics, {"frequency": "120 Hz", "peak_acceleration": "1 g"}]}
     thick = {"liquid": {"viscosity_ratio": 2.0}, "dimers": {"replicates": 3, "angle": "10 deg"}}
-    decks = [render_deck(case) for case in (make_case(), make_case(**thick), Case.read(several))]
+    decks = [render_deck(case) for case in (make_case(), make_case(**thick), build_case(several))]
     decks += [render_deck(make_case(**thick, drive={"frame": "lab", "axis": axis})) for axis in "xyz"]
     shared = [
         make_case(),

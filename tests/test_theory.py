@@ -14,6 +14,7 @@ from scipy.special import mathieu_a, mathieu_b
 
 from tests.conftest import call, document, make_case, to_toml
 from walkers.arrays import FloatArray
+from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.loads import dimer_of, resistances_at_rest
 from walkers.inputs.tables.case import Case
@@ -70,7 +71,7 @@ def test_bridges_slow_the_theorys_walker_as_they_do_the_engines(
     run_directory: Callable[..., Path], case: str | None, changes: dict[str, Any]
 ) -> None:
     """Its velocity, both beads' rotation and the sliding at all contacts."""
-    case = load_case(case, changes) if case else make_case().changed(changes)
+    case = load_case(case, changes) if case else changed_case(make_case(), changes)
     result, motion = read(run_directory(case)), motion_of(case)
     found = [result["velocity"], result["rotation_1"], result["rotation_2"]]
     found += [result["sliding_1"], result["sliding_2"], result["sliding_pair_1"]]
@@ -143,7 +144,7 @@ def test_the_engines_walkers_start_at_the_theorys_threshold(
     law = {"friction": {"bead_bead": friction, "bead_wall": friction}}
     case = make_case(contact=law, run={"cycles": 12, "settling_cycles": 8})
     expected = threshold(case)
-    cases = [case.changed({"drive.gamma0": share * expected}) for share in (0.7, 1.3)]
+    cases = [changed_case(case, {"drive.gamma0": share * expected}) for share in (0.7, 1.3)]
     below, above = (read(run_directory(one))["velocity"] for one in cases)
     assert abs(below) < 2e-6 < above
 
@@ -190,7 +191,7 @@ def test_the_engines_contacts_open_where_the_theory_says(run_directory: Callable
     end = predict(case)["detachment"]
     assert end["gamma"] > 3.0 * detachment(dimer_of(case).sin_delta).gamma
     peaks = [f"{dimer_of(case).peak_acceleration(share * end['gamma']):.9g} m/s^2" for share in (0.8, 1.25)]
-    closed, opened = (read(run_directory(case.changed({"drive.peak_acceleration": peak}))) for peak in peaks)
+    closed, opened = (read(run_directory(changed_case(case, {"drive.peak_acceleration": peak}))) for peak in peaks)
     assert [closed[f"open_{contact}"] for contact in ("1", "2", "pair_1")] == [0.0] * 3
     assert (end["reason"], opened["open_pair_1"] > 0.1) == ("bead on bead would open", True)
 
@@ -242,7 +243,7 @@ def climber(viscosity: float, tilt: str = "90 deg", **drive: str) -> Case:
     tables["contact"] |= {"friction": {"bead_bead": 0.5, "bead_wall": 0.5}, "rolling_friction": 0.0}
     tables["drive"] |= {"frequency": "170 Hz", "peak_acceleration": "16.2 g", **drive}
     tables["run"] = {"cycles": 20, "settling_cycles": 10, "samples_per_cycle": 1}
-    return Case.read(tables, name="climber")
+    return build_case(tables, name="climber")
 
 
 def test_in_viscous_bridges_a_dimer_turns_over_as_its_beads_settle() -> None:

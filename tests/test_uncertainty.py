@@ -19,6 +19,7 @@ import walkers
 from tests.conftest import call, make_case
 from walkers.commands.catalogue import catalogue
 from walkers.files import write_json
+from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving import library
 from walkers.inputs.tables.case import Case
@@ -69,7 +70,7 @@ SLOPE: dict[str, Any] = {
 @pytest.fixture(scope="module")
 def steep(tmp_path_factory: pytest.TempPathFactory) -> walkers.Run:
     """Two dimers on a slope of 20°, one that faces up and one that faces down; the only run of its folder."""
-    return walkers.run(Case.read(SLOPE, name="steep"), tmp_path_factory.mktemp("steep"))
+    return walkers.run(build_case(SLOPE, name="steep"), tmp_path_factory.mktemp("steep"))
 
 
 def test_walkers_that_face_up_and_down_a_slope_differ(steep: walkers.Run) -> None:
@@ -124,7 +125,7 @@ def test_on_a_slope_the_band_of_a_spread_is_that_of_one_way(steep: walkers.Run, 
 
 def test_slopes_are_compared_by_the_walkers_that_face_up(steep: walkers.Run, tmp_path: Path) -> None:
     tables = {**SLOPE, "boundary": {"material": "glass", "tilt": "10 deg"}}
-    gentle = walkers.run(Case.read(tables, name="gentle"), tmp_path)
+    gentle = walkers.run(build_case(tables, name="gentle"), tmp_path)
     text = walkers.compare(steep.directory, gentle.directory).text
     assert "\nright_facing (mm/s)" in text
     assert "\nvelocity (mm/s)" not in text
@@ -159,7 +160,7 @@ def test_the_final_angle_is_printed_unless_some_walkers_turned_over(steep: walke
 def test_clusters_on_a_slope_are_averaged_by_the_way_they_face_and_lean_by_how_far_they_turned(tmp_path: Path) -> None:
     """Not by the angle between the way that they face and their beads in front, which the arrangement contains."""
     steep = {**FOUR_BEADS, "boundary": {"material": "glass", "tilt": "30 deg"}}
-    done = walkers.run(Case.read(steep, name="four"), tmp_path)
+    done = walkers.run(build_case(steep, name="four"), tmp_path)
     result, each = done.result, done.walkers
     up, down = (each[each["facing"] == way] for way in (1, -1))
     assert (result["climbing"], result["descending"]) == (1, 1)
@@ -253,7 +254,7 @@ PAIR = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2}
 def changed(case: Case, shorter: float, harder: float) -> Case:
     """A case with a part of its time step and a multiple of its modulus."""
     step, modulus = 1e6 * case.run.time_step * shorter, 1e-6 * case.contact.youngs_modulus * harder
-    return case.changed({"run.time_step": f"{step!r} us", "contact.youngs_modulus": f"{modulus!r} MPa"})
+    return changed_case(case, {"run.time_step": f"{step!r} us", "contact.youngs_modulus": f"{modulus!r} MPa"})
 
 
 @pytest.mark.slow
@@ -335,7 +336,7 @@ def test_walkers_up_and_down_a_slope_both_converge(tmp_path: Path) -> None:
 )
 def test_beads_are_compared_with_the_hardest_possible(modulus: float, times: list[float], tmp_path: Path) -> None:
     """Those of 90 GPa cannot be harder: their error is that of the time step alone, and the result says so."""
-    case = Case.read(
+    case = build_case(
         {
             "dimers": {"diameters": ["10 mm", "7 mm"], "replicates": 1},
             "beads": {"material": "chrome steel"},

@@ -15,11 +15,11 @@ import walkers
 from tests.conftest import to_toml
 from walkers.arrays import FloatArray
 from walkers.errors import InputError
+from walkers.inputs.case_building import build_case, changed_case, stored_case
 from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.standing import standing as starts
 from walkers.inputs.sweep import load_sweep
-from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.shape import LOOSE
 from walkers.inputs.tables.shapes.walls import FLOOR
 from walkers.postprocess.measure.motion import read_bridges
@@ -196,7 +196,7 @@ def test_a_box_is_the_same_from_a_mesh_from_planes_and_by_its_size(tmp_path: Pat
     cases = []
     for boundary in (BOX, {"mesh": mesh, "scale": "1 mm"}, {"planes": planes, "height": "12 mm"}):
         tables = {key: value for key, value in {**poured(**boundary), **ball}.items() if value is not None}
-        cases.append(Case.read(tables))
+        cases.append(build_case(tables))
     decks = [render_deck(case) for case in cases]
     assert decks[0].text == decks[1].text == decks[2].text
     assert decks[0].files == decks[1].files == decks[2].files
@@ -212,14 +212,14 @@ def test_a_run_is_named_by_the_numbers_of_its_vessel(tmp_path: Path, name: str) 
     hexagon = prism(6, 4e-3, 12e-3)
     path = Path(write(tmp_path, hexagon, name))
     tables = poured(mesh=str(path), scale="1 mm")
-    case, other = Case.read(tables), Case.read(poured(mesh=write(tmp_path, hexagon), scale="1 mm"))
+    case, other = build_case(tables), build_case(poured(mesh=write(tmp_path, hexagon), scale="1 mm"))
     path.unlink()
     places = [run_place(one, find_engine(), tmp_path) for one in (case, other)]
     if name in ("a.vtu", "a.vtk", "a.off"):  # the others have fewer digits or another order of points
         assert places[0] == places[1]
-    again = [Case.from_dict(case.as_dict()), case.changed({}), Case.read(case.document)]
+    again = [stored_case(case.as_dict()), changed_case(case, {}), build_case(case.document)]
     assert all(one.boundary == case.boundary for one in again)
-    larger = case.changed({"boundary.scale": "1.5 mm"})
+    larger = changed_case(case, {"boundary.scale": "1.5 mm"})
     assert larger.boundary.width == pytest.approx(1.5 * case.boundary.width)
     assert run_place(larger, find_engine(), tmp_path) != places[0]
     assert len(case.boundary.walls) == 7
@@ -243,9 +243,9 @@ MESHES: dict[str, Any] = {
 def test_files_of_one_vessel(tmp_path: Path, name: str) -> None:
     """Wherever its points are, of polygons, of few digits, of triangles that are turned either way."""
     box = prism(4, 2.65e-3, 12e-3)
-    expected = Case.read(poured(mesh=write(tmp_path, box), scale="1 mm")).boundary
+    expected = build_case(poured(mesh=write(tmp_path, box), scale="1 mm")).boundary
     MESHES[name](1e3 * box.points, box.triangles).write(tmp_path / "other.vtk")
-    found = Case.read(poured(mesh=str(tmp_path / "other.vtk"), scale="1 mm")).boundary
+    found = build_case(poured(mesh=str(tmp_path / "other.vtk"), scale="1 mm")).boundary
     assert (found.walls, found.width, found.height) == (expected.walls, 5.3e-3, 12e-3)
     np.testing.assert_allclose(found.volume(6e-3), 5.3e-3**2 * 6e-3, rtol=1e-9)
 
@@ -257,7 +257,7 @@ def test_beads_are_between_a_vessel_and_a_body_in_it(tmp_path: Path) -> None:
     for toward in (1.0, -1.0):
         body = cuboid(low, high, toward)
         both = Vessel(np.concatenate([box.points, body.points]), np.concatenate([box.triangles, 8 + body.triangles]))
-        boundary = Case.read(poured(mesh=write(tmp_path, both), scale="1 mm")).boundary
+        boundary = build_case(poured(mesh=write(tmp_path, both), scale="1 mm")).boundary
         assert boundary.volume(4e-3) == pytest.approx(16e-6 * 4e-3 - np.prod(high - low), rel=1e-2)
         places = np.array([[0.0, 0.0, 3.2e-3], [0.0, 0.0, 2.9e-3], [0.7e-3, 0.0, 2.5e-3]])
         np.testing.assert_allclose(boundary.side_clearance(places), [2e-4, -1e-4, 2e-4], atol=1e-12)
@@ -268,7 +268,7 @@ def test_a_vessel_is_as_high_as_the_lowest_point_of_its_rim(tmp_path: Path) -> N
     oblique = Vessel(points * [1.0, 1.0, 1.0] + np.outer(points[:, 0] * (points[:, 2] > 0.0), [0.0, 0.0, 0.5]),
                      prism(6, 4e-3, 12e-3).triangles)  # fmt: skip
     height = 12e-3 - 0.5 * np.abs(points[:, 0]).max()
-    boundary = Case.read(poured(mesh=write(tmp_path, oblique), scale="1 mm")).boundary
+    boundary = build_case(poured(mesh=write(tmp_path, oblique), scale="1 mm")).boundary
     assert boundary.height == pytest.approx(height)
     assert boundary.volume(2.0 * height) == pytest.approx(6.0 * (4e-3) ** 2 / sqrt(3.0) * height)
 
@@ -289,9 +289,9 @@ def test_beads_are_poured_above_others_up_to_twice_the_height(tmp_path: Path) ->
     tables = poured(mesh=mesh, scale="1 mm") | {"placed": [{"radius": "0.5 mm", "at": at}]}
     mixture = POURED["mixture"] | {"large": ["0.5 mm", "0.5 mm"]}
     with pytest.raises(InputError, match=r"the vessel has places for .* up to twice its height of 8 mm") as refusal:
-        Case.read(tables | {"mixture": mixture | {"count": 5000}})
+        build_case(tables | {"mixture": mixture | {"count": 5000}})
     room = int(str(refusal.value).split()[-1])
-    case = Case.read(tables | {"mixture": mixture | {"count": room}})
+    case = build_case(tables | {"mixture": mixture | {"count": room}})
     (_, pile), _ = starts(case)
     heights, radius = [bead.z for bead in pile.beads], LOOSE * 0.5e-3
     assert len(heights) == room
@@ -353,7 +353,7 @@ def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
     """Its volume, how far beads are from it, and how many of its faces are nearest around the foot of a bead."""
     size, off = 5e-3, []
     for rings in (4, 8, 16):
-        case = Case.read(poured(mesh=write(tmp_path, bowl(size, rings)), scale="1 mm"))
+        case = build_case(poured(mesh=write(tmp_path, bowl(size, rings)), scale="1 mm"))
         vessel = case.boundary.vessel
         assert vessel.height == pytest.approx(size)
         off.append(1.0 - vessel.volume() / (2.0 / 3.0 * pi * size**3))
@@ -366,7 +366,7 @@ def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
     with pytest.raises(
         InputError, match=r"faces, edges and corners; expected at most .* for 50000 beads: a coarser mesh"
     ):
-        case.changed({"mixture.count": 50_000})
+        changed_case(case, {"mixture.count": 50_000})
     away, near = np.random.default_rng(1).normal(size=(400, 3)), 0.9 * size
     centres = np.array([0.0, 0.0, size]) - near * (
         away * [1.0, 1.0, 0.0] + [0.0, 0.0, 3.0] * np.abs(away)
@@ -409,14 +409,14 @@ def test_walkers_in_a_vessel_walk_as_on_a_plane(tmp_path: Path) -> None:
     changes = {"dimers.replicates": 1, "dimers.facing": "right", "run.cycles": 10, "run.settling_cycles": 4}
     of = {"mesh": write(tmp_path, prism(12, 4e-3, 3e-3)), "scale": "1 mm", "material": "chromium-coated glass"}
     plane = load_case("fig1b", changes)
-    vessel = Case.read({**plane.document, "boundary": of}, name="vessel")
+    vessel = build_case({**plane.document, "boundary": of}, name="vessel")
     speeds = [walkers.run(case, tmp_path).result["velocity"] for case in (plane, vessel)]
     assert speeds[1] == pytest.approx(speeds[0], rel=1e-6)
     with pytest.raises(InputError, match=r"of the vessel; expected at most \d+, a smaller dimers\.spac") as refusal:
-        vessel.changed({"dimers.replicates": 30, "dimers.meet": True})
+        changed_case(vessel, {"dimers.replicates": 30, "dimers.meet": True})
     most = int(str(refusal.value).split("at most ")[1].split(",")[0])
-    assert vessel.changed({"dimers.replicates": most, "dimers.meet": True}).count == 2 * most > 2
+    assert changed_case(vessel, {"dimers.replicates": most, "dimers.meet": True}).count == 2 * most > 2
     with pytest.raises(InputError, match=r"dimers\.replicates = 6: the walkers, .* of the vessel; expected 1, a"):
-        Case.read({**load_case("fig1b").document, "boundary": of}, name="vessel")
+        build_case({**load_case("fig1b").document, "boundary": of}, name="vessel")
     with pytest.raises(InputError, match=f"expected at most {most},"):
-        vessel.changed({"dimers.replicates": most + 1, "dimers.meet": True})
+        changed_case(vessel, {"dimers.replicates": most + 1, "dimers.meet": True})

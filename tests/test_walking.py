@@ -19,6 +19,7 @@ from tests.conftest import document
 from walkers.api import compare
 from walkers.errors import InputError, Stopped
 from walkers.files import read_json, write_json
+from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.loads import contact_loads, dimer_of
 from walkers.inputs.tables.case import Case
@@ -326,7 +327,7 @@ def test_a_run_that_ends_before_its_walker_turns_over_says_how_long_it_must_be(r
     assert not shorts[1].result.warnings
     cycles = int(warning.rpartition("= ")[2])
     assert 60 <= cycles <= 400
-    longer = walkers.run(shorts[0].case.changed({"run.cycles": cycles}), runs_folder)
+    longer = walkers.run(changed_case(shorts[0].case, {"run.cycles": cycles}), runs_folder)
     (turned,) = longer.walkers["turned_at"]
     # A run is to be half as long again as until then.
     assert turned == pytest.approx(cycles / 1.5 / longer.case.excitation.frequency, rel=0.1)
@@ -344,12 +345,12 @@ def test_a_walker_on_a_level_plate_that_turns_away_says_when(runs_folder: Path) 
     seconds, cycles = float(warning.partition("about ")[2].split()[0]), int(warning.rpartition("= ")[2])
     angle = abs(done.result["orientation_end"])
     assert seconds == pytest.approx(-np.log(np.tan(angle)) / turning_rate(case), rel=0.2)
-    longer = walkers.run(case.changed({"run.cycles": cycles}), runs_folder)
+    longer = walkers.run(changed_case(case, {"run.cycles": cycles}), runs_folder)
     table = longer.table("cycles")
     names = [run.directory.name for run in (done, longer)]
     assert f"{names[0]}: warning: {warning}" in compare(*names, runs_folder).text
     # Rolling friction may hold walkers at less than a degree.
-    assert not walkers.run(case.changed({"dimers.angle": "0.5 deg"}), runs_folder).result.warnings
+    assert not walkers.run(changed_case(case, {"dimers.angle": "0.5 deg"}), runs_folder).result.warnings
     away = table["time"][table["orientation"].abs() > np.pi / 4.0].iloc[0]
     assert away - done.table("cycles")["time"].iloc[-1] == pytest.approx(seconds, rel=0.25)
     assert not walkers.run(load_case("fig1b"), runs_folder).result.warnings
@@ -369,7 +370,7 @@ def test_small_angles_that_decay_are_not_said_to_grow(runs_folder: Path) -> None
 
 def test_progress_says_when_results_are_measured(tmp_path: Path) -> None:
     told: list[Progress] = []
-    make_runs([Case.read(document(run=SHORT), name="short")], tmp_path, find_engine(), on_progress=told.append)
+    make_runs([build_case(document(run=SHORT), name="short")], tmp_path, find_engine(), on_progress=told.append)
     assert told[-1] == Progress(1.0, "measuring")
 
 
@@ -409,7 +410,7 @@ def test_the_cost_of_transport_is_that_of_each_kinds_own_mass(run_directory: Run
     radii = {0: [0.3e-3, 0.2e-3], 1: [0.6e-3, 0.3e-3, 0.3e-3]}
     fan = {"arrangement": "fan", "radii": ["0.6 mm", "0.3 mm", "0.3 mm"], "replicates": 1}
     tables = document(dimers={"replicates": 1}, run={"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10})
-    case = Case.read({**tables, "clusters": [fan]}, name="two-kinds")
+    case = build_case({**tables, "clusters": [fan]}, name="two-kinds")
     result = read(run_directory(case))
     cycles = result.table("cycles").set_index("cycle")
     costs = []
@@ -438,7 +439,7 @@ def _hopping(samples: int, **run: object) -> Case:
     tables = read_toml(shipped("case")["fig4b"])
     tables["dimers"]["replicates"] = 1
     tables["run"] = {"time_step": "3 us", "cycles": 12, "settling_cycles": 4, "samples_per_cycle": samples, **run}
-    return Case.read(tables, source="test", name=f"hopping-{samples}")
+    return build_case(tables, source="test", name=f"hopping-{samples}")
 
 
 def test_means_do_not_depend_on_how_often_is_looked(groups: dict[int, Group]) -> None:
@@ -483,7 +484,7 @@ def _shipped(angle: float = 0.0, **drive: Any) -> Case:
     """The shipped walker alone, started at an angle in degrees, with other values of the drive."""
     start = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1, "angle": f"{angle} deg", "spacing": "80 mm"}
     tables = {name: table for name, table in read_toml(shipped("case")["fig1b"]).items() if name != "run"}
-    return Case.read({**tables, "dimers": start, "drive": {**tables["drive"], **drive}}, name="shipped")
+    return build_case({**tables, "dimers": start, "drive": {**tables["drive"], **drive}}, name="shipped")
 
 
 def _turning() -> Case:
@@ -539,7 +540,7 @@ def test_a_restless_walker_is_driven_for_longer_at_a_stretch(tmp_path: Path) -> 
     ],
 )
 def test_what_settles_slowly_runs_in_full_and_numbers_are_obeyed(changes: dict[str, Any], expected: Any) -> None:
-    run = Case.read({**document(**changes), "run": changes.get("run", {})}, name="test").run
+    run = build_case({**document(**changes), "run": changes.get("run", {})}, name="test").run
     assert (run.until_steady, run.cycles, run.settling_cycles) == expected
 
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from walkers.api import run
 from walkers.arrays import FloatArray
+from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import bridge_at_rest, contact_loads, resistances_at_rest
 from walkers.inputs.tables.case import Case
@@ -69,7 +70,7 @@ def symmetry(out: Path) -> Iterator[Line]:
             {"frequency": f"{tone} Hz", "peak_acceleration": f"{peak} g", "phase": f"{phase} deg"}
             for tone, peak, phase in ((first, 4, start), (120, 3, start + 90))
         ]
-        case = Case.read({**given, "drive": {"harmonics": sines}}, name="symmetric")
+        case = build_case({**given, "drive": {"harmonics": sines}}, name="symmetric")
         speeds.append(1e3 * run(case, out).result["velocity"])
     odd, even, opposite = speeds
     yield Line("symmetric dimer, tones 2:3: velocity (not zero)", 0.0, even, unit="mm/s")

@@ -64,10 +64,10 @@ def load_case(case: str | Path | Mapping[str, Any], changes: Mapping[str, Any] |
     path = Path("case.toml") if isinstance(case, Mapping) else find_input(case, "case")
     document = case if isinstance(case, Mapping) else read_case(path)
     # Not above: a missing file is reported before the models of a case are built, which takes time.
-    from walkers.inputs.tables.case import Case
+    from walkers.inputs.case_building import build_case
 
     source = "<case>" if isinstance(case, Mapping) else str(case)
-    return Case.read(document, source=source, name=path.stem, changes=changes, around=True)
+    return build_case(document, source=source, name=path.stem, changes=changes, around=True)
 
 
 def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from walkers.inputs.axes import (
     sampled,
     zipped,
 )
+from walkers.inputs.case_building import build_case
 from walkers.inputs.config_table import Table, alternatives, changed
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, check_key, validated
@@ -119,7 +120,7 @@ class Sweep:
             where = f"{self.source}: point {number} ({text})" if text else self.source
             with blaming(where):
                 document = changed(Case, self.document, changes)
-            case = Case.read(document, source=where, name=self.case_name)
+            case = build_case(document, source=where, name=self.case_name)
             # The title of the base case may not hold here.
             yield case.but(title=f"{shortened(self.name)}: {shortened(text)}") if text else case
 

@@ -27,6 +27,7 @@ from typing import Any
 
 from walkers.errors import refused
 from walkers.files import fsync_path, link_or_copy, open_regular, read_json, write_bytes, write_json
+from walkers.inputs.case_building import stored_case
 from walkers.inputs.tables.case import Case
 from walkers.physics.laws import LAWS, source_of, source_sha256
 from walkers.runner.binary import Engine
@@ -115,7 +116,7 @@ def case_of(directory: Path) -> Case:
 def _case_in(directory: Path, *_file: int) -> Case:
     """The case in a file, which is read once as long as the file stays the same."""
     check_unchanged(directory, [CASE_NAME])
-    return Case.from_dict(read_json(directory / CASE_NAME))
+    return stored_case(read_json(directory / CASE_NAME))
 
 
 def with_recorded_law(case: Case, directory: Path) -> Case:

@@ -17,6 +17,7 @@ from typing import Any
 
 from walkers.errors import refused
 from walkers.files import checksum, read_json, write_json
+from walkers.inputs.case_building import build_case, stored_case
 from walkers.inputs.config_table import changed
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.run import CONSTANT, settling_of
@@ -125,7 +126,7 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
     from walkers.postprocess.measure.gait import are_constant
 
     record = read_json(folder / on_disk.DECK_RECORD_NAME)
-    before = on_disk.with_recorded_law(Case.from_dict(record["case"]), folder)
+    before = on_disk.with_recorded_law(stored_case(record["case"]), folder)
     words = (_PRINTED.findall(log.read_text(encoding="utf-8", errors="replace")) or [""])[-1].split()
     values = {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
     was = _parameters(record["deck"], values)
@@ -196,7 +197,7 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
         changes |= {"run.time_step": f"{step!r} s", "run.allow_unstable": True}
     if "cycles" in edited:
         changes |= {"run.cycles": cycles} | ({"run.settling_cycles": settling_of(cycles)} if case.apart else {})
-    ran = Case.read(changed(Case, case.document, changes), source=source, name=case.name).for_cycles(cycles)
+    ran = build_case(changed(Case, case.document, changes), source=source, name=case.name).for_cycles(cycles)
     frequency, parts = ran.excitation.frequency, case.run.samples_per_cycle
     if not isclose(step * steps * frequency, 1.0, rel_tol=_SAME) or steps % parts:
         raise ValueError(

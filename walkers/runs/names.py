@@ -14,6 +14,7 @@ from typing import Any, Literal, TypeAlias
 
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import InputError, WalkersError, refused
+from walkers.inputs.case_building import changed_case
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
 from walkers.inputs.tables.case import Case
 from walkers.runner import directory as on_disk
@@ -86,11 +87,11 @@ class Reference:
         """
         given = self.given
         if isinstance(given, Case):
-            return given.changed(self.changes)
+            return changed_case(given, self.changes)
         if isinstance(given, Mapping):
             return load_case(given, self.changes)
         if self.kind == "run":
-            return readable_case(self.path).changed(self.changes)
+            return changed_case(readable_case(self.path), self.changes)
         if self.kind in ("sweep", "calibration"):
             # A file of a sweep or a calibration is refused with what it is, a directory as not being a case.
             find_input(str(given) if is_sweep_file(Path(given)) else self.path, "case")

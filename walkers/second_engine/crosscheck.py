@@ -16,6 +16,7 @@ from scipy.spatial.distance import pdist
 
 from walkers.api import run
 from walkers.arrays import FloatArray
+from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
@@ -67,7 +68,7 @@ def crosscheck(
     >>> [line for line in crosscheck(load_case("fig1b"), tmp) if line.failed]
     []
     """
-    cases = [case.changed({"run.seed": case.run.seed + number} if number else {}) for number in range(seeds)]
+    cases = [changed_case(case, {"run.seed": case.run.seed + number} if number else {}) for number in range(seeds)]
     motions = [run(start, out, progress=progress, engine=engine).motion for start in cases]
     return compare(motions, without)
 
@@ -137,7 +138,7 @@ def shortened(case: Case, cycles: int) -> Case:
         raise ValueError(f"expected at least {least}" + (f", a multiple of {rare}" if rare > 1 else ""))
     lengths = ("cycles", "most_cycles", "duration", "settling_cycles")
     run = {key: value for key, value in case.document.get("run", {}).items() if key not in lengths}
-    return Case.read({**case.document, "run": {**run, "cycles": cycles}}, source=case.name, name=case.name)
+    return build_case({**case.document, "run": {**run, "cycles": cycles}}, source=case.name, name=case.name)
 
 
 def simulate(motion: Motion, without: Collection[str] = ()) -> Motion:
@@ -189,8 +190,8 @@ def full_cases() -> dict[str, Case]:
     shorter = {
         "alignment from 30°": (load_case("fig1b", {"dimers.angle": "30 deg", **alone}), 40),
         "symmetric from 30°": (load_case("symmetric", {"dimers.angle": "30 deg", **alone}), 40),
-        "fan of three": (Case.read(clusters, name="fig1b"), 24),
-        "two tones": (Case.read({**symmetric, "drive": {"harmonics": tones}}, name="symmetric"), 24),
+        "fan of three": (build_case(clusters, name="fig1b"), 24),
+        "two tones": (build_case({**symmetric, "drive": {"harmonics": tones}}, name="symmetric"), 24),
         "slope of 5°": (load_case("fig1b", {"boundary.tilt": "5 deg"}), 24),
         "groove of 120°": (load_case("fig1b", {"boundary.shape": "groove", "boundary.opening": "120 deg"}), 24),
         "climber": (load_case("climber"), 20),

@@ -21,6 +21,7 @@ import numpy as np
 
 from walkers.arrays import FloatArray, Vector
 from walkers.errors import Stopped
+from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import surfaces_of
 from walkers.inputs.tables.case import Case
@@ -98,7 +99,7 @@ _FULL = {
 
 def bench_case(changes: Mapping[str, Any]) -> Case:
     """A case without friction, damping, viscosity, gravity and drive, with changes by dotted keys."""
-    return Case.read(_BARE, source="<audit>", name="audit", changes=changes)
+    return build_case(_BARE, source="<audit>", name="audit", changes=changes)
 
 
 def full_case(changes: Mapping[str, Any]) -> Case:

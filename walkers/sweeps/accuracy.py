@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import refused
 from walkers.files import write_json
+from walkers.inputs.case_building import build_case
 from walkers.inputs.sweep import Sweep, expand
 from walkers.inputs.tables.case import STIFFEST, Case
 from walkers.postprocess.measure.results import recorded
@@ -61,7 +62,7 @@ def measure_accuracy(
     """
     case = case_of(directory)
     possible = times_of(case)
-    today = Case.read(case.document, source=directory.name, name=case.name)
+    today = build_case(case.document, source=directory.name, name=case.name)
     if run_place(today, find_engine(engine), directory.parent).name != directory.name:
         text = "expected a run with the installed engine and program, and with the present library and bridge law"
         raise refused(directory.name, f"{text}; run its case again")

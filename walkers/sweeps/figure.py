@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from walkers.arrays import FloatArray
 from walkers.errors import InputError, expected_of, refused
+from walkers.inputs.case_building import changed_case
 from walkers.inputs.resolving.library import unmeasured
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.numbers import draws_text
@@ -337,8 +338,8 @@ class _Theory:
 def _with_number(case: Case, key: str, value: float, unit: str) -> Case:
     """The case with a number of a key in a unit; without a unit it is a plain number, in case files too."""
     if unit:
-        return case.changed({key: f"{value!r} {unit}"})
-    return case.changed({key: int(value) if value.is_integer() else value})
+        return changed_case(case, {key: f"{value!r} {unit}"})
+    return changed_case(case, {key: int(value) if value.is_integer() else value})
 
 
 def _factor(done: pd.DataFrame, column: str) -> float:

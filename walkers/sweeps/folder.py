@@ -20,7 +20,7 @@ from typing import Any, TypeAlias
 
 from walkers.errors import InputError, refused, suggestion
 from walkers.files import VTK_SCRATCH, abandoned, read_json
-from walkers.inputs.tables.case import Case
+from walkers.inputs.case_building import stored_case
 from walkers.postprocess.measure.numbers import headline, in_short
 from walkers.postprocess.measure.results import plain, read
 from walkers.postprocess.measure.uncertainty import ACCURACY, SPREAD
@@ -83,7 +83,7 @@ def _run(path: Path, now: float) -> Row | None:
         return None
     values: dict[str, Any] = {}
     try:
-        case = Case.from_dict(read_json(path / on_disk.CASE_NAME))
+        case = stored_case(read_json(path / on_disk.CASE_NAME))
         values = {"case": case.name, "parameters": flattened(case)}
     except (OSError, ValueError, KeyError, TypeError):
         if not on_disk.is_run_name(place.name) or not (finished or (place != path and on_disk.holds_unfinished(path))):

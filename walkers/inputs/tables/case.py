@@ -14,12 +14,11 @@ from html import escape
 from math import cos, hypot, inf, isclose, pi, sin
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import BeforeValidator, Field
 
 from walkers.arrays import Vector
-from walkers.errors import InputError, Problem, apply_all, refused, unusable
+from walkers.errors import Problem
 from walkers.inputs import units
-from walkers.inputs.axes import ranges_of
 from walkers.inputs.config_table import (
     SAME_RUN,
     Choice,
@@ -27,21 +26,14 @@ from walkers.inputs.config_table import (
     Filled,
     Indirect,
     Table,
-    alternatives,
-    changed,
-    contradictions,
     key,
 )
 from walkers.inputs.keys import MISSING, flatten, is_axis, parts_of, value_at
-from walkers.inputs.messages import blaming, check_key, validated
 from walkers.inputs.origins import Origin, Source, Whence, text_of
-from walkers.inputs.resolving.library import library_of
-from walkers.inputs.resolving.steps import NAMES, SUPPLIED, resolve, supplied
 from walkers.inputs.tables.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.drive import AXES, Drive, Excitation
 from walkers.inputs.tables.run import Run, settling_of
-from walkers.inputs.toml import with_files
 from walkers.inputs.units import Coefficient, Number, kind_in
 from walkers.physics.bridge import BridgeLaw
 from walkers.physics.capillary import DEFAULT_LAW, BridgeLiquid
@@ -198,92 +190,6 @@ class Case(Table):
     def _values(self) -> tuple[Any, ...]:
         return tuple(getattr(self, name) for name in type(self).model_fields if name not in _ABOUT)
 
-    # --- reading and changing -------------------------------------------------------------------------------------
-
-    @classmethod
-    def read(
-        cls,
-        document: Mapping[str, Any],
-        *,
-        source: str = "<case>",
-        name: str = "case",
-        changes: Mapping[str, Any] | None = None,
-        around: bool = False,
-    ) -> Case:
-        """A case given as the tables of a case file, quantities as strings with units.
-
-        Messages begin with the ``source``, run directories with the ``name``; ``changes`` are other values by dotted
-        keys; ``around``: uncertain ranges must hold the values of the case, which points of sweeps may leave.
-        """
-        if changes:
-            with blaming(source):
-                apply_all(lambda name: check_key(cls, name), changes)
-                document = changed(cls, document, changes)
-        with blaming(source, document):
-            document = with_files(document)
-            records = document.pop("records", {})
-            if isinstance(file := value_at(document, ("drive", "record")), str):
-                document["drive"] = {**document["drive"], "record": {"file": file, **records[file]}}
-            tables, sources, unknown = supplied(cls, document, library_of(document, source))
-            try:
-                case = validated(cls, tables, source, further=[*unknown, *contradictions(cls, tables)])
-            except InputError as error:  # what the library would have given under another name is not missing too
-                misnamed = unknown or any(problem.key in NAMES and problem.value for problem in error.problems)
-                hidden = SUPPLIED if misnamed else ()
-                kept = [problem for problem in error.problems if problem.value or problem.key not in hidden]
-                raise InputError(source, kept) from error
-            try:
-                case = resolve(case.but(name=name, document=document, sources=sources))
-            except ArithmeticError as error:
-                raise refused(source, f"inconsistent values: {error}") from error
-            case._check_uncertain(tables, source, around=around)
-        return case
-
-    def _check_uncertain(self, tables: Mapping[str, Any], source: str, *, around: bool) -> None:
-        """Uncertain values are keys of the case, which could say both ends of the range."""
-        written = flatten(tables.get("uncertain", {}))
-
-        def check(name: str) -> None:
-            try:
-                check_key(Case, name)
-                if ranges_of({name: self.uncertain[name]})[name].median is not None:
-                    raise unusable(name, "expected [low, high]: the case's own value is the median")
-                (ends,) = self.uncertain[name].values()
-                low, high = (validated(Case, changed(Case, tables, {name: end}), source).value_of(name) for end in ends)
-            except InputError as error:
-                message = error.problems[0].expected.replace("{ uniform = [low, high] }", "[low, high]")
-                raise unusable(f"uncertain.{name}", message, written[name]) from error
-            value, slack = self.value_of(name), 1e-9 * (high - low)
-            if value is None and (instead := sorted(key for key in alternatives(Case, name) if self.value_of(key))):
-                message = f"expected {' or '.join(instead)}, which the case has instead"
-                raise unusable(f"uncertain.{name}", message, written[name])
-            if around and isinstance(value, (int, float)) and not low - slack <= value <= high + slack:
-                text = next((origin.text for origin in self.origins if origin.key == name), str(value))
-                message = f"expected a range that holds the case's own value, {text}"
-                raise unusable(f"uncertain.{name}", message, written[name])
-
-        apply_all(check, self.uncertain)
-
-    def changed(self, changes: Mapping[str, Any]) -> Case:
-        """The case with other values of its file, by dotted keys and as a case file has them.
-
-        Examples
-        --------
-        >>> from walkers import load_case
-        >>> load_case("fig1b").changed({"drive.frequency": "70 Hz", "dimers.radii[1]": "0.25 mm"}).dimers.radii
-        (0.0003, 0.00025)
-        """
-        return Case.read(self.document, source=self.name, name=self.name, changes=changes) if changes else self
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Case:
-        """A case from `as_dict`, without keys of earlier versions of the program; raises `ValueError` if it is none."""
-        try:
-            return cls.model_validate(values, extra="ignore")
-        except ValidationError as error:
-            first = error.errors()[0]
-            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
-
     def as_dict(self) -> dict[str, Any]:
         """The whole case as plain JSON types, SI units, with the tables it was read from and its values' sources."""
         return self.model_dump(mode="json")
@@ -343,8 +249,6 @@ class Case(Table):
         cells = ([origin.key, origin.text, origin.word, origin.source] for origin in self.origins)
         rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in cells)
         return f"<table><caption>{escape(self.title or self.name)}</caption>{rows}</table>"
-
-    # --- questions ------------------------------------------------------------------------------------------------
 
     @property
     def walkers_by_key(self) -> dict[str, Walkers]:

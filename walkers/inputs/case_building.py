@@ -1,0 +1,165 @@
+"""A `Case` from the tables of its file: completed, validated and resolved; and cases that were stored or are changed.
+
+Files are found and read by `walkers.inputs.reading`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import ValidationError
+
+from walkers.errors import InputError, Problem, apply_all, refused, unusable
+from walkers.inputs.axes import ranges_of
+from walkers.inputs.config_table import alternatives, changed, contradictions
+from walkers.inputs.keys import flatten, value_at
+from walkers.inputs.messages import blaming, check_key, validated
+from walkers.inputs.resolving.library import library_of
+from walkers.inputs.resolving.steps import NAMES, SUPPLIED, resolve, supplied
+from walkers.inputs.tables.case import Case
+from walkers.inputs.toml import with_files
+
+
+def build_case(
+    document: Mapping[str, Any],
+    *,
+    source: str = "<case>",
+    name: str = "case",
+    changes: Mapping[str, Any] | None = None,
+    around: bool = False,
+) -> Case:
+    """Resolve a case that is given as the tables of a case file.
+
+    Parameters
+    ----------
+    document
+        The tables; quantities are strings with units.
+    source
+        What messages call the document.
+    name
+        Name of the case, with which the names of its run directories begin.
+    changes
+        Values that replace those of the document, by dotted keys, written as in a case file.
+    around
+        Whether uncertain ranges must contain the values of the case. Points of a sweep may leave them.
+
+    Returns
+    -------
+    Case
+        All values in SI units; ``document`` contains the tables with the changes and the contents
+        of the files that they name.
+
+    Raises
+    ------
+    InputError
+        If the document or a change is invalid, with all problems of the step that detects the first.
+    """
+    if changes:
+        with blaming(source):
+            apply_all(lambda key: check_key(Case, key), changes)
+            document = changed(Case, document, changes)
+    with blaming(source, document):
+        document = _with_record(with_files(document))
+        tables, sources, unknown = supplied(Case, document, library_of(document, source))
+        case = _validated(tables, unknown, source)
+        try:
+            case = resolve(case.but(name=name, document=document, sources=sources))
+        except ArithmeticError as error:
+            raise refused(source, f"inconsistent values: {error}") from error
+        _check_uncertain(case, tables, source, around=around)
+    return case
+
+
+def changed_case(case: Case, changes: Mapping[str, Any]) -> Case:
+    """The case with other values in its file, resolved anew.
+
+    Parameters
+    ----------
+    case
+        A case with the document from which it was built.
+    changes
+        Values by dotted keys, written as in a case file.
+
+    Returns
+    -------
+    Case
+        Under the same name; the same case if there are no changes.
+
+    Raises
+    ------
+    InputError
+        If a change is invalid.
+
+    Examples
+    --------
+    >>> from walkers import load_case
+    >>> case = load_case("fig1b")
+    >>> changed_case(case, {"drive.frequency": "70 Hz", "dimers.radii[1]": "0.25 mm"}).dimers.radii
+    (0.0003, 0.00025)
+    """
+    if not changes:
+        return case
+    return build_case(case.document, source=case.name, name=case.name, changes=changes)
+
+
+def stored_case(values: Mapping[str, Any]) -> Case:
+    """Read a case from what `Case.as_dict` returns; keys of earlier versions of the program are left out.
+
+    Raises
+    ------
+    ValueError
+        If the values are not those of a case.
+    """
+    try:
+        return Case.model_validate(values, extra="ignore")
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+
+
+def _with_record(document: dict[str, Any]) -> dict[str, Any]:
+    """The tables with the rows of the recorded shaking in the place of the name of its file."""
+    records = document.pop("records", {})
+    file = value_at(document, ("drive", "record"))
+    if isinstance(file, str):
+        document["drive"] = {**document["drive"], "record": {"file": file, **records[file]}}
+    return document
+
+
+def _validated(tables: Mapping[str, Any], unknown: list[Problem], source: str) -> Case:
+    """The tables as a case; ``unknown`` are problems of names that the library does not have."""
+    try:
+        return validated(Case, tables, source, further=[*unknown, *contradictions(Case, tables)])
+    except InputError as error:
+        # What the library would have given under another name is not missing too.
+        misnamed = unknown or any(problem.key in NAMES and problem.value for problem in error.problems)
+        hidden = SUPPLIED if misnamed else ()
+        kept = [problem for problem in error.problems if problem.value or problem.key not in hidden]
+        raise InputError(source, kept) from error
+
+
+def _check_uncertain(case: Case, tables: Mapping[str, Any], source: str, *, around: bool) -> None:
+    """Uncertain values are keys of the case, which could say both ends of the range."""
+    written = flatten(tables.get("uncertain", {}))
+
+    def check(name: str) -> None:
+        try:
+            check_key(Case, name)
+            if ranges_of({name: case.uncertain[name]})[name].median is not None:
+                raise unusable(name, "expected [low, high]: the case's own value is the median")
+            (ends,) = case.uncertain[name].values()
+            low, high = (validated(Case, changed(Case, tables, {name: end}), source).value_of(name) for end in ends)
+        except InputError as error:
+            message = error.problems[0].expected.replace("{ uniform = [low, high] }", "[low, high]")
+            raise unusable(f"uncertain.{name}", message, written[name]) from error
+        value, slack = case.value_of(name), 1e-9 * (high - low)
+        if value is None and (instead := sorted(key for key in alternatives(Case, name) if case.value_of(key))):
+            message = f"expected {' or '.join(instead)}, which the case has instead"
+            raise unusable(f"uncertain.{name}", message, written[name])
+        if around and isinstance(value, (int, float)) and not low - slack <= value <= high + slack:
+            text = next((origin.text for origin in case.origins if origin.key == name), str(value))
+            message = f"expected a range that holds the case's own value, {text}"
+            raise unusable(f"uncertain.{name}", message, written[name])
+
+    apply_all(check, case.uncertain)
