@@ -62,6 +62,7 @@ CASES: list[tuple[dict[str, Any], str]] = [
     ({"liquid": {"volume_fracton": 0.01}}, 'liquid.volume_fracton = 0.01: unknown key; [liquid] takes name, '),
     ({"dimers": {"seed": 2}}, 'did you mean "run.seed"'),
     ({"run": {"until_steady": True}}, "run.until_steady = true: unknown key; [run] takes time_step, "),
+    ({"boundary": {"points": [[0, 0, 0]]}}, "boundary.points = [[0, 0, 0]]: unknown key; [boundary] takes shape, "),
     *(({name: {"own": {}}}, f'{name} = {{"own": {{}}}}: unknown key: the program reads this table from a file')
       for name in ("meshes", "records")),
     # What contradicts something else

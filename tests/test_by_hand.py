@@ -15,7 +15,7 @@ from walkers import run as run_case
 from walkers.errors import InputError
 from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.config_table import changed
-from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.case import Case, CaseFile
 from walkers.runner.directory import FIRST_SEGMENT
 from walkers.runs.by_hand import take_in, write_folder
 from walkers.runs.case_text import differing, flattened
@@ -125,7 +125,7 @@ def _numbers(case: Case) -> list[float]:
 def test_an_edited_deck_is_another_case(name: str, tmp_path: Path, run_directory: Callable[..., Path]) -> None:
     tables, edits, changes = EDITED[name]
     case, expected = (
-        build_case(changed(Case, {**document(run=SHORT), **tables}, more), name="test") for more in ({}, changes)
+        build_case(changed(CaseFile, {**document(run=SHORT), **tables}, more), name="test") for more in ({}, changes)
     )
     folder = write_folder(case, tmp_path / "hand").parent
     _edit(folder, **edits)

@@ -23,7 +23,7 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.library import library_of, unmeasured
 from walkers.inputs.resolving.loads import gravity_warnings
 from walkers.inputs.sweep import expand
-from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.units import parse_quantity, quantity_text
 from walkers.physics.mixtures import water_glycerol
 from walkers.postprocess.measure.uncertainty import lines_of_rest, rests_on
@@ -169,9 +169,9 @@ def test_a_case_is_changed_as_its_file_would_be() -> None:
     assert changed_case(case, {"drive.gamma0": 0.5}).drive.peak_acceleration > 50.0
     first, last = ({f"drive.harmonics[{number}].peak_acceleration": "2 g"} for number in (0, 1))
     tables = {"drive": {"harmonics": [{"gamma0": 0.4, "axis": "x"}, {"gamma0": 0.2}]}}
-    assert changed(Case, tables, last)["drive"]["harmonics"][1] == {"peak_acceleration": "2 g"}
+    assert changed(CaseFile, tables, last)["drive"]["harmonics"][1] == {"peak_acceleration": "2 g"}
     both = {"gamma0": 0.3, "axis": "x", "peak_acceleration": "2 g"}  # each as it is said
-    assert changed(Case, tables, {**first, "drive.harmonics[0].gamma0": 0.3})["drive"]["harmonics"][0] == both
+    assert changed(CaseFile, tables, {**first, "drive.harmonics[0].gamma0": 0.3})["drive"]["harmonics"][0] == both
 
 
 HARMONICS = [{"frequency": "80 Hz", "gamma0": 0.2}, {"frequency": "120 Hz", "peak_acceleration": "1 g", "axis": "y"}]
@@ -224,7 +224,7 @@ def test_the_schema_refuses_what_the_program_refuses(in_folder: Path, monkeypatc
         ("name", "x", ""),
     ]
     for key, value, place in changes:
-        wrong = changed(Case, tables, {key: value})
+        wrong = changed(CaseFile, tables, {key: value})
         (error,) = schema.iter_errors(wrong)
         assert ".".join(map(str, error.absolute_path)) == place
         with pytest.raises(InputError):

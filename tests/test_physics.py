@@ -20,9 +20,9 @@ from tests.test_bad_input import LAW
 from walkers import run as run_case
 from walkers.arrays import FloatArray
 from walkers.inputs.reading import load_case
+from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.loads import bridge_at_rest, delay
-from walkers.inputs.tables.case import Roughness
-from walkers.inputs.tables.run import limits_of
+from walkers.inputs.tables.materials import Roughness
 from walkers.physics import reynolds
 from walkers.physics.bridge import Surfaces
 from walkers.physics.capillary import BridgeLiquid, largest_normal, share_of_bead

@@ -23,9 +23,9 @@ from docs.tables import markdown
 from walkers.commands import ALL_COMMANDS
 from walkers.commands.catalogue import COMMANDS, NOT_KNOWN, catalogue
 from walkers.inputs.config_table import Table, example_of, keys_in, table_in
+from walkers.inputs.resolving.from_library import SUPPLIED
 from walkers.inputs.resolving.library import LibraryNumber
-from walkers.inputs.resolving.steps import SUPPLIED
-from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.case import CaseFile
 from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
 from walkers.main import print_help, program
 from walkers.postprocess.measure.quantities import GROUPS, TABLES, Quantity
@@ -112,7 +112,7 @@ def _row(name: str, field: FieldInfo, *, supplied: bool) -> tuple[str, str, str,
     return f"`{name}`", str(field.description), expected, "from the library" if supplied else _default(field)
 
 
-def tables_of_keys(model: type[Table] = Case, place: str = "") -> Iterator[tuple[str, str]]:
+def tables_of_keys(model: type[Table] = CaseFile, place: str = "") -> Iterator[tuple[str, str]]:
     """Tables of a case file: heading, and its keys as a table of Markdown with what excludes what."""
     fields = keys_in(model)
     below = {name: table_in(field.annotation) for name, field in fields.items()}

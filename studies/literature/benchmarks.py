@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkers.arrays import FloatArray
-from walkers.inputs.tables.case import Friction, Roughness
+from walkers.inputs.tables.materials import Friction, Roughness
 from walkers.physics.contact import Impact, reduced_modulus
 from walkers.second_engine.engine import SecondEngine
 from walkers.second_engine.lines import Line

@@ -23,7 +23,7 @@ from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import validated
 from walkers.inputs.reading import find_input
 from walkers.inputs.sweep import Sweep, expand
-from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.case import CaseFile
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import Number, Whole
 
@@ -150,7 +150,7 @@ class Calibration:
     def case(self, values: FloatArray) -> dict[str, Any]:
         """Tables of the case of the first experiment, with these values of the parameters (D,)."""
         sweep = self.sweep(self.name, values[None], [next(iter(self.experiments))])
-        return changed(Case, sweep.document, dict(zip(sweep.keys, sweep.rows[0], strict=True)))
+        return changed(CaseFile, sweep.document, dict(zip(sweep.keys, sweep.rows[0], strict=True)))
 
     def _changes(self, label: str, row: FloatArray | None) -> dict[str, Value]:
         """Values of the keys of parameters in an experiment, for one parameter set (D,)."""

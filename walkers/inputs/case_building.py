@@ -15,9 +15,10 @@ from walkers.inputs.axes import ranges_of
 from walkers.inputs.config_table import alternatives, changed, contradictions
 from walkers.inputs.keys import flatten, value_at
 from walkers.inputs.messages import blaming, check_key, validated
+from walkers.inputs.resolving.from_library import NAMES, SUPPLIED, supplied
 from walkers.inputs.resolving.library import library_of
-from walkers.inputs.resolving.steps import NAMES, SUPPLIED, resolve, supplied
-from walkers.inputs.tables.case import Case
+from walkers.inputs.resolving.steps import resolve
+from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.toml import with_files
 
 
@@ -57,14 +58,14 @@ def build_case(
     """
     if changes:
         with blaming(source):
-            apply_all(lambda key: check_key(Case, key), changes)
-            document = changed(Case, document, changes)
+            apply_all(lambda key: check_key(CaseFile, key), changes)
+            document = changed(CaseFile, document, changes)
     with blaming(source, document):
         document = _with_record(with_files(document))
-        tables, sources, unknown = supplied(Case, document, library_of(document, source))
-        case = _validated(tables, unknown, source)
+        tables, sources, unknown = supplied(document, library_of(document, source))
+        file = _validated(tables, unknown, source)
         try:
-            case = resolve(case.but(name=name, document=document, sources=sources))
+            case = resolve(file, name=name, document=document, sources=sources)
         except ArithmeticError as error:
             raise refused(source, f"inconsistent values: {error}") from error
         _check_uncertain(case, tables, source, around=around)
@@ -127,10 +128,10 @@ def _with_record(document: dict[str, Any]) -> dict[str, Any]:
     return document
 
 
-def _validated(tables: Mapping[str, Any], unknown: list[Problem], source: str) -> Case:
-    """The tables as a case; ``unknown`` are problems of names that the library does not have."""
+def _validated(tables: Mapping[str, Any], unknown: list[Problem], source: str) -> CaseFile:
+    """The tables as a case file; ``unknown`` are problems of names that the library does not have."""
     try:
-        return validated(Case, tables, source, further=[*unknown, *contradictions(Case, tables)])
+        return validated(CaseFile, tables, source, further=[*unknown, *contradictions(CaseFile, tables)])
     except InputError as error:
         # What the library would have given under another name is not missing too.
         misnamed = unknown or any(problem.key in NAMES and problem.value for problem in error.problems)
@@ -145,16 +146,18 @@ def _check_uncertain(case: Case, tables: Mapping[str, Any], source: str, *, arou
 
     def check(name: str) -> None:
         try:
-            check_key(Case, name)
+            check_key(CaseFile, name)
             if ranges_of({name: case.uncertain[name]})[name].median is not None:
                 raise unusable(name, "expected [low, high]: the case's own value is the median")
             (ends,) = case.uncertain[name].values()
-            low, high = (validated(Case, changed(Case, tables, {name: end}), source).value_of(name) for end in ends)
+            low, high = (
+                validated(CaseFile, changed(CaseFile, tables, {name: end}), source).value_of(name) for end in ends
+            )
         except InputError as error:
             message = error.problems[0].expected.replace("{ uniform = [low, high] }", "[low, high]")
             raise unusable(f"uncertain.{name}", message, written[name]) from error
         value, slack = case.value_of(name), 1e-9 * (high - low)
-        if value is None and (instead := sorted(key for key in alternatives(Case, name) if case.value_of(key))):
+        if value is None and (instead := sorted(key for key in alternatives(CaseFile, name) if case.value_of(key))):
             message = f"expected {' or '.join(instead)}, which the case has instead"
             raise unusable(f"uncertain.{name}", message, written[name])
         if around and isinstance(value, (int, float)) and not low - slack <= value <= high + slack:

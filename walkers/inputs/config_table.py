@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Collection, Iterator, Mapping
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args, get_origin
+from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 from pydantic.fields import FieldInfo
@@ -17,6 +17,7 @@ from walkers.inputs.keys import joined, parts_of
 from walkers.inputs.units import WRITTEN, is_auto, kind_in
 
 T = TypeVar("T")
+Completed = TypeVar("Completed", bound="Table")
 SAME_RUN = "same run"
 """Annotation of a key: another value does not make another run, by itself."""
 _TYPES: Mapping[Any, str] = {str: "text in quotes", int: "a whole number", list: "a list", dict: "a table"}
@@ -29,14 +30,8 @@ def _only_derived(value: object, validation: ValidationInfo) -> object:
 
 
 _DERIVED = BeforeValidator(_only_derived)
-if TYPE_CHECKING:
-    Filled = Annotated[T, "filled"]
-    Indirect = Annotated[T, "indirect"]
-else:
-    Filled = T | None
-    """A key that a file may leave out: None until it is filled in."""
-    Indirect = Annotated[T | None, SAME_RUN]
-    """A key that acts through others: None unless it is given, and no determinant of the run."""
+Indirect = Annotated[T | None, SAME_RUN]
+"""A key that acts through others: None unless it is given, and no determinant of the run."""
 Derived = Annotated[T, _DERIVED, SkipJsonSchema()]
 """A field that follows from others, which no file has."""
 
@@ -67,7 +62,12 @@ class Choice(NamedTuple):
 class Table(BaseModel):
     """A table of a file. Its fields are the keys; values are in SI units; unknown keys are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, ignored_types=(cached_property,))
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        ignored_types=(cached_property,),
+        model_title_generator=lambda model: model.__name__.removesuffix("Table"),
+    )
     choices: ClassVar[tuple[Choice, ...]] = ()
 
     @cached_property
@@ -102,6 +102,24 @@ class Table(BaseModel):
             new = below[int(number)].put(joined(inner), value) if inner else value
             return self.but(**{str(first): (*below[: int(number)], new, *below[int(number) + 1 :])})
         return self.but(**{str(first): below.put(joined(rest), value)})
+
+    def completed(self, model: type[Completed], values: Mapping[str, Any]) -> Completed:
+        """The table as a model that narrows this one.
+
+        Parameters
+        ----------
+        model
+            A subclass of the table whose values are all there once they are resolved.
+        values
+            Values in SI units of the keys that the file leaves out, and of others to be replaced.
+
+        Returns
+        -------
+        Completed
+            The model, validated: a value that is still missing is an error of the program.
+        """
+        own = {name: getattr(self, name) for name in type(self).model_fields}
+        return model.model_validate({**own, **values})
 
     def value_of(self, name: str) -> Any:
         """The value of a dotted key; None if there is no such place."""
@@ -166,6 +184,13 @@ class Table(BaseModel):
     def missing(cls, name: str, place: str, instead: str = "") -> Problem:
         """The problem of a missing key of a table at a place, with an example, and alternatives."""
         return Problem(within(place, name), None, f"missing; expected {example_of(cls.model_fields[name])}{instead}")
+
+
+def present(value: T | None, name: str) -> T:
+    """A value of a dotted key that the choices of its table require; raises `InputError` if it is missing."""
+    if value is None:
+        raise unusable(name, "missing")
+    return value
 
 
 def within(place: str, name: str) -> str:

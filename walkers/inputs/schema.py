@@ -9,13 +9,17 @@ from typing import Any
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core.core_schema import NullableSchema, TupleSchema, WithDefaultSchema
 
-from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.case import CaseFile
 
 _LINK = re.compile(r" See \[\]\(\S+\)\.")  # to a page, from the page of keys
 
 
 class _Generator(GenerateJsonSchema):
     """Without null, which TOML lacks, without defaults, which are in SI units, and without titles."""
+
+    def normalize_name(self, name: str) -> str:
+        """Definitions are named after tables: ``Liquid``, not ``LiquidTable``."""
+        return super().normalize_name(name).removesuffix("Table")
 
     def field_title_should_be_set(self, schema: Any) -> bool:  # noqa: ARG002
         return False
@@ -36,7 +40,7 @@ class _Generator(GenerateJsonSchema):
 
 def case_schema() -> dict[str, Any]:
     """The schema of a case file (JSON Schema 2020-12), without exclusions of keys and values of the library."""
-    schema = Case.model_json_schema(schema_generator=_Generator)
+    schema = CaseFile.model_json_schema(schema_generator=_Generator)
     schema = json.loads(_LINK.sub("", json.dumps(schema)))
     schema["properties"]["library"] = {"type": "object", "description": "Materials and liquids of the case itself."}
     for table in ("Beads", "Liquid", "Contact", "Friction"):  # the library may give what they lack

@@ -29,7 +29,7 @@ from walkers.inputs.config_table import Table, alternatives, changed
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import blaming, check_key, validated
 from walkers.inputs.reading import find_input, read_case, shipped
-from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.toml import read_toml, with_files
 from walkers.inputs.units import Speed, Whole
 
@@ -119,7 +119,7 @@ class Sweep:
             text = ", ".join(f"{key} = {value}" for key, value in changes.items())
             where = f"{self.source}: point {number} ({text})" if text else self.source
             with blaming(where):
-                document = changed(Case, self.document, changes)
+                document = changed(CaseFile, self.document, changes)
             case = build_case(document, source=where, name=self.case_name)
             # The title of the base case may not hold here.
             yield case.but(title=f"{shortened(self.name)}: {shortened(text)}") if text else case
@@ -177,15 +177,15 @@ def expand(
             keys, rows = combinations(axes)
             if "title" in keys:
                 raise unusable("title", "expected another key, for title does not determine a run")
-            apply_all(partial(check_key, Case), (*settings, *keys))
+            apply_all(partial(check_key, CaseFile), (*settings, *keys))
             for key in keys:
-                for alternative in alternatives(Case, key) & {*keys}:
+                for alternative in alternatives(CaseFile, key) & {*keys}:
                     raise unusable(key, f"expected one of {key} and {alternative}, which replace each other")
             case_name, given = (path.stem, read_case(path, folder)) if path else base or ("", {})
             varied = (pair for axis in axes for row in axis.rows for pair in zip(axis.keys, row, strict=True))
             given = with_files(given, folder, [*settings.items(), *varied])
-            tables = changed(Case, given, settings)
-            changed(Case, tables, dict(zip(keys, rows[0], strict=True)))
+            tables = changed(CaseFile, given, settings)
+            changed(CaseFile, tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
         raise refused(source, "has infinitely nested tables") from error
     until = file.descend.until_below if file.descend else None

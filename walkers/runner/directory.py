@@ -193,13 +193,14 @@ def is_finished(directory: Path) -> bool:
 
 def drive_from(case: Case, done: Iterable[Mapping[str, Any]]) -> int | None:
     """Step at which the drive begins: the end of the first segment that leaves the beads at rest; None: unknown yet."""
-    if not case.run.rests:
+    settled_below, longest_settling = case.run.settled_below, case.run.longest_settling
+    if settled_below is None or longest_settling is None:  # the beads do not rest before the drive
         return 0
     for segment in done:
         if segment["drive_from"] is not None:
             return int(segment["drive_from"])
-        at_rest = segment["root_mean_square_velocity"] < case.run.settled_below
-        if at_rest or segment["end"] * case.run.time_step >= case.run.longest_settling:
+        at_rest = segment["root_mean_square_velocity"] < settled_below
+        if at_rest or segment["end"] * case.run.time_step >= longest_settling:
             return int(segment["end"])
     return None
 

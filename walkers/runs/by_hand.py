@@ -19,7 +19,7 @@ from walkers.errors import refused
 from walkers.files import checksum, read_json, write_json
 from walkers.inputs.case_building import build_case, stored_case
 from walkers.inputs.config_table import changed
-from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.tables.run import CONSTANT, settling_of
 from walkers.physics.laws import source_of
 from walkers.postprocess.measure.dump import DumpError
@@ -197,7 +197,7 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
         changes |= {"run.time_step": f"{step!r} s", "run.allow_unstable": True}
     if "cycles" in edited:
         changes |= {"run.cycles": cycles} | ({"run.settling_cycles": settling_of(cycles)} if case.apart else {})
-    ran = build_case(changed(Case, case.document, changes), source=source, name=case.name).for_cycles(cycles)
+    ran = build_case(changed(CaseFile, case.document, changes), source=source, name=case.name).for_cycles(cycles)
     frequency, parts = ran.excitation.frequency, case.run.samples_per_cycle
     if not isclose(step * steps * frequency, 1.0, rel_tol=_SAME) or steps % parts:
         raise ValueError(

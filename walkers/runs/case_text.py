@@ -13,7 +13,7 @@ from walkers.errors import refused
 from walkers.inputs import units
 from walkers.inputs.config_table import keys_of
 from walkers.inputs.origins import text_of
-from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.units import Kind
 
 
@@ -74,7 +74,7 @@ def _is(key: str, value: Any, text: str) -> bool:
 @cache
 def kind_of(key: str) -> Kind | None:
     """Kind of quantity of a key of a case, such as ``dimers.radii[0]``; None for pure numbers."""
-    fields = (field for name, field in keys_of(Case).items() if _ending(name) == _ending(key))
+    fields = (field for name, field in keys_of(CaseFile).items() if _ending(name) == _ending(key))
     return next(filter(None, (units.kind_in([*field.metadata, field.annotation]) for field in fields)), None)
 
 

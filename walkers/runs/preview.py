@@ -6,11 +6,12 @@ from dataclasses import asdict
 from math import acos, degrees, isfinite
 from typing import Any
 
+from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.library import library_of
 from walkers.inputs.resolving.loads import contact_loads, dimer_of, gravity_warnings
 from walkers.inputs.tables.bodies import Walkers
 from walkers.inputs.tables.case import Case
-from walkers.inputs.tables.run import CONSTANT, limits_of
+from walkers.inputs.tables.run import CONSTANT
 from walkers.inputs.units import ACCELERATION_OF_ONE_G, MODULUS, parse_quantity
 from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
 from walkers.physics.time_step import FRACTIONS
@@ -156,7 +157,7 @@ def _text_of_vessel(vessel: dict[str, Any]) -> str:
 def _liquid(case: Case, volume: float) -> float:
     """Volume of the liquid on all beads, or, if their menisci give it, in the bridges of the walkers, m³."""
     if case.liquid.meniscus_radius is None:
-        return volume * case.liquid.volume_fraction
+        return volume * case.liquid.of_bridges.volume_fraction
     loads = ((load, walkers.replicates) for walkers in case.walkers for load in contact_loads(case, walkers))
     return sum(load.surfaces.volume * replicates for load, replicates in loads)
 

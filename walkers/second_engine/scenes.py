@@ -405,7 +405,7 @@ def company_lines(bench: Bench) -> Iterator[Line]:
     """A walker in a shared deck against the same walker in a deck of its own; and a repeated run."""
     alone = load_case("fig1b", {"dimers.replicates": 1, "contact.rolling_friction": 0.0})  # which amplifies rounding
     alone = alone.but(run=alone.run.but(cycles=10, cycles_per_segment=10, until_steady=False))
-    stronger = alone.put("drive.peak_acceleration", 2.0 * alone.drive.peak_acceleration)
+    stronger = alone.put("drive.peak_acceleration", 2.0 * alone.excitation.peak_acceleration)
     sloping = alone.put("boundary.tilt", 0.3)
 
     def ran(*cases: Case) -> Measured:

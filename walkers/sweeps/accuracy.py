@@ -17,7 +17,8 @@ from walkers.errors import refused
 from walkers.files import write_json
 from walkers.inputs.case_building import build_case
 from walkers.inputs.sweep import Sweep, expand
-from walkers.inputs.tables.case import STIFFEST, Case
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.materials import STIFFEST
 from walkers.postprocess.measure.results import recorded
 from walkers.postprocess.measure.sides import STEADY_SPEED
 from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 
 from walkers.arrays import Vector
 from walkers.errors import InputError, Problem
+from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.loads import bridge_at_rest, hop_height, reach
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import AXES, Excitation
-from walkers.inputs.tables.run import limits_of
 from walkers.physics.capillary import bead_volume
 from walkers.physics.laws import LAWS
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker

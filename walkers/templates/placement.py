@@ -15,8 +15,9 @@ from functools import lru_cache
 from walkers.arrays import Vector
 from walkers.inputs.resolving.loads import hop_height, reach
 from walkers.inputs.resolving.standing import standing
-from walkers.inputs.tables.case import Case, Contact
+from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import AXES
+from walkers.inputs.tables.materials import Contact
 from walkers.inputs.tables.shapes.walls import Wall
 from walkers.physics.capillary import BridgeLiquid
 from walkers.templates.layout import PlacedWalker

@@ -338,6 +338,8 @@ def _without_offset(rows: FloatArray, repeats: bool = False) -> PPoly:
 
 def record_of(value: object) -> object:
     """A record from its file's name and its rows, which stand in the place of the name in a case."""
+    if isinstance(value, Record):
+        return value
     try:
         rows = tuple((float(time), float(x), float(y), float(z)) for time, x, y, z in value["rows"])  # type: ignore[index]
     except (LookupError, TypeError, ValueError) as error:

@@ -6,21 +6,19 @@ from collections.abc import Iterable
 from functools import lru_cache
 from itertools import combinations_with_replacement
 from math import inf, pi, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from walkers.inputs.tables.bodies import Walkers
+from walkers.inputs.tables.case import Case, Setup
 from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.physics.capillary import bead_volume, largest_normal
 from walkers.physics.contact import hertz_overlap, hertz_stiffness, reduced_modulus
 from walkers.physics.dimer import Dimer
 
-if TYPE_CHECKING:
-    from walkers.inputs.tables.bodies import Walkers
-    from walkers.inputs.tables.case import Case
 
-
-def dimer_of(case: Case) -> Dimer:
+def dimer_of(case: Setup) -> Dimer:
     """The dimer of a case; raises `ValueError` unless its first walkers are dimers."""
     radii = case.walkers[0].radii if case.walkers else ()
     if len(radii) != 2:
@@ -37,12 +35,12 @@ class Load(NamedTuple):
     overlap: float = 0.0
 
 
-def bridge_at_rest(case: Case, radius: float, other_radius: float) -> Load:
+def bridge_at_rest(case: Setup, radius: float, other_radius: float) -> Load:
     """The bridge of a bead to another, or to a plane (a radius of infinity), by the case's law; radii in m."""
     return _at_rest(case.law, surfaces_of(case, radius, other_radius))
 
 
-def surfaces_of(case: Case, radius: float, other_radius: float) -> Surfaces:
+def surfaces_of(case: Setup, radius: float, other_radius: float) -> Surfaces:
     """A bead of a case and another bead or a plane (a radius of infinity), with a bridge between them; radii in m."""
     return Surfaces.of(radius, other_radius, case.liquid.of_bridges, case.contact.roughness)
 
@@ -55,7 +53,7 @@ def _at_rest(law: BridgeLaw, surfaces: Surfaces) -> Load:
     return Load(surfaces, float(pull[0]), curve.rupture)
 
 
-def resistances_at_rest(case: Case, radius: float, other_radius: float) -> tuple[float, float, float]:
+def resistances_at_rest(case: Setup, radius: float, other_radius: float) -> tuple[float, float, float]:
     """S (N s/m), C (N s) and Q (N m s) of that bridge, the smaller bead as body 1 (`walkers.physics.bridge`)."""
     touching = case.law(surfaces_of(case, radius, other_radius)).forces(np.zeros(1))
     _, _, sliding, coupling, rolling = map(float, touching.columns()[0])
@@ -75,7 +73,7 @@ _MEASURED_ERRORS = (0.0, 0.03, 0.09, 0.15, 1.3)
 more slowly than with beads of 12.8 GPa. At the last one, the dimer goes down."""
 
 
-def softness_warning(case: Case) -> str | None:
+def softness_warning(case: Setup) -> str | None:
     """How far the delay of contacts changes the speeds of the loose beads of a case.
 
     None below `_NOTICED_DELAY`.
@@ -90,7 +88,7 @@ def softness_warning(case: Case) -> str | None:
     return f"{soft} up to {error:.0f} % off those of hard beads (contact.youngs_modulus)"
 
 
-def gravity_warnings(case: Case) -> list[str]:
+def gravity_warnings(case: Setup) -> list[str]:
     """What is doubtful about bridges of beads that are large or heavy; empty for small beads or without gravity.
 
     The bridge laws leave out gravity. It deforms menisci as large as the capillary length √(γ/ρg), which the bridges of
@@ -119,12 +117,12 @@ def gravity_warnings(case: Case) -> list[str]:
     return warnings
 
 
-def delay_of(case: Case) -> float:
+def delay_of(case: Setup) -> float:
     """The largest phase by which bridges delay any contact of a case, rad: of its walkers and of its loose beads."""
     return max([delay_of_loose_beads(case), *(delay(case, walkers) for walkers in case.walkers)])
 
 
-def delay(case: Case, walkers: Walkers) -> float:
+def delay(case: Setup, walkers: Walkers) -> float:
     """Phase by which bridges delay the contacts of walkers in the drive, ωN/k, rad.
 
     A contact of stiffness k, loaded by its bridge and weight, follows a changing load with the time constant N/k of the
@@ -134,7 +132,7 @@ def delay(case: Case, walkers: Walkers) -> float:
     return _largest_delay(case, contact_loads(case, walkers))
 
 
-def delay_of_loose_beads(case: Case) -> float:
+def delay_of_loose_beads(case: Setup) -> float:
     """The same phase for the placed beads and the mixture of a case, rad: the largest of any two beads or a wall.
 
     The contacts are loaded by their bridges alone, as at an upright wall.
@@ -142,7 +140,7 @@ def delay_of_loose_beads(case: Case) -> float:
     return _largest_delay(case, _loads_of_loose_beads(case))
 
 
-def _loads_of_loose_beads(case: Case) -> list[Load]:
+def _loads_of_loose_beads(case: Setup) -> list[Load]:
     """Contacts of each radius of the placed beads and the mixture with the wall and with each other radius."""
     radii = {bead.radius for bead in case.placed}
     if case.mixture is not None:
@@ -151,13 +149,13 @@ def _loads_of_loose_beads(case: Case) -> list[Load]:
     return [_with_overlap(case, bridge_at_rest(case, *pair)) for pair in pairs if pair != (inf, inf)]
 
 
-def _with_overlap(case: Case, bridge: Load, weight: float = 0.0) -> Load:
+def _with_overlap(case: Setup, bridge: Load, weight: float = 0.0) -> Load:
     """A bridge with the overlap at which the repulsion balances its pull and a weight, N."""
     modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     return bridge._replace(overlap=hertz_overlap(bridge.pull + weight, bridge.surfaces.reduced_radius, modulus))
 
 
-def _largest_delay(case: Case, loads: Iterable[Load]) -> float:
+def _largest_delay(case: Setup, loads: Iterable[Load]) -> float:
     """The largest 2πfN/k of contacts, rad; contacts without a load have none."""
     modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     longest = 0.0
@@ -169,7 +167,7 @@ def _largest_delay(case: Case, loads: Iterable[Load]) -> float:
     return 2.0 * pi * case.excitation.fastest * longest
 
 
-def contact_loads(case: Case, walkers: Walkers | None = None) -> list[Load]:
+def contact_loads(case: Setup, walkers: Walkers | None = None) -> list[Load]:
     """The contacts of a case's first (or other) walkers at rest: each bead on the floor, then each pair of beads."""
     make = walkers or case.walkers[0]
     density, gravity = case.beads.density, case.pressing_gravity
@@ -182,13 +180,27 @@ def contact_loads(case: Case, walkers: Walkers | None = None) -> list[Load]:
 
 
 def reach(case: Case) -> float:
-    """Room around the start of a walker, m.
+    """Room around the start of a walker, m (`room_of_paths`)."""
+    longest = max((walkers.length for walkers in case.walkers), default=0.0)
+    return room_of_paths(case.excitation.peak_velocity, case.duration, longest)
+
+
+def room_of_paths(peak_velocity: float, duration: float, longest: float) -> float:
+    """Room around the start of walkers, m.
 
     Walkers move at a few per cent of the substrate's peak velocity (0.14 of it was the fastest seen, at Γ0 = 0.76
     and friction 0.5); 0.3 of it through the whole run leaves room for those that hop, and sideways as well.
+
+    Parameters
+    ----------
+    peak_velocity
+        Peak velocity of the substrate, m/s.
+    duration
+        Duration of the drive, s.
+    longest
+        Length of the longest walker, m.
     """
-    longest = max((walkers.length for walkers in case.walkers), default=0.0)
-    return 0.3 * case.excitation.peak_velocity * case.duration + 2.0 * longest
+    return 0.3 * peak_velocity * duration + 2.0 * longest
 
 
 def hop_height(case: Case) -> float:

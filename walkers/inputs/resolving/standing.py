@@ -6,7 +6,7 @@ from bisect import bisect_left
 from collections.abc import Iterator
 from functools import lru_cache
 from math import atan2, ceil, cos, dist, inf, pi, sin
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.random import default_rng
@@ -14,10 +14,8 @@ from numpy.random import default_rng
 from walkers.errors import unusable
 from walkers.inputs.resolving.loads import contact_loads
 from walkers.inputs.tables.bodies import Mixture, Walkers
+from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import FLOOR
-
-if TYPE_CHECKING:
-    from walkers.inputs.tables.case import Case
 
 OVERLAP = 0.01
 """Radii by which beads that are given places may overlap with each other and the walls."""
@@ -107,7 +105,7 @@ def _top_of_others(case: Case) -> float:
     return max([*walking, *(bead.at[2] + bead.radius for bead in case.placed)], default=0.0)
 
 
-def check_bodies(case: Case) -> Case:
+def check_bodies(case: Case) -> None:
     """Refuse bodies that do not fit into the boundary or beside each other."""
     boundary, mixture = case.boundary, case.mixture
     if boundary.shape == "vessel":
@@ -127,7 +125,6 @@ def check_bodies(case: Case) -> Case:
         _check_walls(case, beads)
         if case.placed or case.meets:
             _check_overlaps(beads)
-    return case
 
 
 def _check_vessel(case: Case) -> None:

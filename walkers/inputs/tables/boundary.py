@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from walkers.arrays import FloatArray, Vector
 from walkers.errors import Problem
 from walkers.inputs import units
-from walkers.inputs.config_table import SAME_RUN, Derived, Filled, Indirect, Table, key, within
+from walkers.inputs.config_table import SAME_RUN, Derived, Indirect, Table, key, within
 from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.tables.shapes.registry import SHAPES, ShapeName
 from walkers.inputs.tables.shapes.shape import Layer, Shape
@@ -34,11 +34,11 @@ class Boundary(Table):
     material: Annotated[str, SAME_RUN] = key(
         "Material, from the library, or any other name beside all friction coefficients.", ..., "glass"
     )
-    opening: Filled[Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)]] = key(
+    opening: Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)] | None = key(
         "Angle between the two walls of a groove.", None, "120 deg"
     )
-    width: Filled[units.Length] = key("Width of a channel; inner side or diameter of a container.", None, "5.3 mm")
-    height: Filled[units.Length] = key("Height of a container. Beads are lost above twice this height.", None, "5.3 mm")
+    width: units.Length | None = key("Width of a channel; inner side or diameter of a container.", None, "5.3 mm")
+    height: units.Length | None = key("Height of a container. Beads are lost above twice this height.", None, "5.3 mm")
     mesh: Indirect[str] = key(
         "File of a vessel of your own: its inner surface, or a solid, as STL, OBJ, PLY, VTP or in another format.",
         None,

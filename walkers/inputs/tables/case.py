@@ -1,8 +1,7 @@
-"""A case in SI units, whose fields are the keys of a file.
+"""A case: what its file says (`CaseFile`), what forces depend on (`Setup`), and the whole of it (`Case`).
 
-What a file leaves out is completed by `walkers.inputs.resolving.steps`.
-
-A deck is rendered from it, a run directory stores it as ``case.json``, and the hash in a run's name is made of it.
+All are in SI units; their fields are the keys of a file. `walkers.inputs.case_building` makes a `Case` of a file. A
+deck is rendered from it, a run directory stores it as ``case.json``, and the hash in a run's name is made of it.
 """
 
 from __future__ import annotations
@@ -12,123 +11,35 @@ from dataclasses import replace
 from functools import cached_property
 from html import escape
 from math import cos, hypot, inf, isclose, pi, sin
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
 
 from walkers.arrays import Vector
 from walkers.errors import Problem
 from walkers.inputs import units
-from walkers.inputs.config_table import (
-    SAME_RUN,
-    Choice,
-    Derived,
-    Filled,
-    Indirect,
-    Table,
-    key,
-)
+from walkers.inputs.config_table import SAME_RUN, Derived, Table, key
 from walkers.inputs.keys import MISSING, flatten, is_axis, parts_of, value_at
-from walkers.inputs.origins import Origin, Source, Whence, text_of
-from walkers.inputs.tables.bodies import MOST_BEADS, Cluster, Dimers, Mixture, PlacedBead, Walkers
+from walkers.inputs.origins import Origin, Source, text_of
+from walkers.inputs.tables.bodies import (
+    MOST_BEADS,
+    Cluster,
+    ClusterTable,
+    Dimers,
+    DimersTable,
+    Mixture,
+    MixtureTable,
+    PlacedBead,
+    PlacedBeadTable,
+    Walkers,
+)
 from walkers.inputs.tables.boundary import Boundary
-from walkers.inputs.tables.drive import AXES, Drive, Excitation
-from walkers.inputs.tables.run import Run, settling_of
-from walkers.inputs.units import Coefficient, Number, kind_in
+from walkers.inputs.tables.drive import AXES, Drive, DriveTable, Excitation
+from walkers.inputs.tables.materials import Beads, Contact, ContactTable, Environment, Liquid, LiquidTable
+from walkers.inputs.tables.run import Run, RunTable, settling_of
+from walkers.inputs.units import kind_in
 from walkers.physics.bridge import BridgeLaw
-from walkers.physics.capillary import DEFAULT_LAW, BridgeLiquid
 from walkers.physics.laws import by_name
-
-STIFFEST = 1e11
-"""Largest Young's modulus of the contacts of a case, Pa: as hard as glass or steel; runs take a day."""
-_SOFTENED = Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFEST)]
-
-
-class Beads(Table):
-    """``[beads]``: the material of all beads."""
-
-    material: Indirect[str] = key("Material of all beads, from the library, which gives the density.", None, "ruby")
-    density: units.Density = key("Density of the beads.")
-
-
-class Liquid(Table):
-    """``[liquid]``: a name from the library, numbers, or both (numbers take precedence)."""
-
-    choices: ClassVar = (
-        Choice("dynamic_viscosity or kinematic_viscosity", instead="a liquid of the library"),
-        Choice("volume_fraction or meniscus_radius"),
-    )
-    name: Indirect[str] = key("Liquid from the library. The other keys override its values.", None, "Si AK5")
-    mass_fraction: Indirect[Number] = key("Mass fraction of glycerol in `water-glycerol`.", None, 0.87, ge=0, le=1)
-    temperature: Indirect[units.Temperature] = key("Temperature of `water-glycerol`. Default: 20 °C.", None)
-    surface_tension: units.SurfaceTension = key("Surface tension.")
-    density: Indirect[units.Density] = key("Density of the liquid.", None)
-    kinematic_viscosity: Indirect[units.KinematicViscosity] = key("Kinematic viscosity.", None)
-    dynamic_viscosity: Filled[units.DynamicViscosity] = key("Dynamic viscosity, instead of the kinematic one.", None)
-    volume_fraction: Filled[Number] = key(
-        "Ratio of the volumes of liquid and bead. The bridges share the liquid.", None, 0.01, ge=1e-9, le=0.5
-    )
-    meniscus_radius: units.Length | None = key(
-        "Radius of the menisci of all bridges, which exchange liquid through the film on a wetted plate.", None, "70 um"
-    )
-    viscosity_ratio: Number = key("Factor of the viscosity of the bridges. It scales their drag.", 1.0, ge=0, le=1e4)
-    contact_angle: units.UpToRightAngle = key(
-        "Contact angle at every bridge. A case whose bridges push the beads of a walker apart at rest is refused."
-    )
-    conserved: units.Flag = key(
-        "Whether bridges take their liquid from the films of their beads, and give it back. For piles.", False
-    )
-    law: str = key("Law of the bridges. See [](../../how-to/bridge-law.md).", DEFAULT_LAW)
-
-    @cached_property
-    def of_bridges(self) -> BridgeLiquid:
-        """What the bridges' law and their tables need of it."""
-        return BridgeLiquid(
-            surface_tension=self.surface_tension,
-            viscosity=float(f"{self.dynamic_viscosity * self.viscosity_ratio:.15g}"),
-            volume_fraction=self.volume_fraction or 0.0,
-            meniscus_radius=self.meniscus_radius or 0.0,
-            contact_angle=self.contact_angle,
-            conserved=self.conserved,
-            law=self.law,
-        )
-
-
-class Friction(Table):
-    """``[contact.friction]``: Coulomb coefficients."""
-
-    bead_bead: Coefficient = key("Coulomb coefficient between two beads.", example=0.25)
-    bead_wall: Coefficient = key("Coulomb coefficient between a bead and the boundary.", example=0.25)
-
-
-class Roughness(Table):
-    """``[contact.roughness]``: gap that remains for the liquid between surfaces that touch at their asperities."""
-
-    bead_bead: units.Length = key("Roughness of a contact of two beads: the root of both squares.", example="30 nm")
-    bead_wall: units.Length = key("Roughness of a contact of a bead and the boundary.", example="30 nm")
-
-
-class Contact(Table):
-    """``[contact]``: the model of the contacts, with the Young's modulus of softened beads and walls.
-
-    The modulus of ``"auto"`` is 50 MPa for loose beads; for walkers it is the lowest of 50, 200, 800, ... MPa at which
-    bridges hardly delay the contacts (`walkers.inputs.resolving.loads.delay`).
-    """
-
-    friction: Friction = key("")
-    roughness: Roughness = key("")
-    rolling_friction: Coefficient = key("Coefficient of rolling friction (constant directional torque).", example=0.01)
-    restitution: Number = key("Coefficient of restitution of the dry contact.", example=0.5, gt=0.05, le=1)
-    youngs_modulus: Annotated[Filled[_SOFTENED], units.AUTO] = key(
-        "Young's modulus of beads and boundary: lower than the real one, so that the time step can be longer.", None
-    )
-    poissons_ratio: Number = key("Poisson's ratio.", 0.3, ge=0, lt=0.5)
-
-
-class Environment(Table):
-    """``[environment]``."""
-
-    gravity: Annotated[float, replace(units.ACCELERATION, example="9.81 m/s^2")] = key("Acceleration of gravity.", 9.81)
 
 
 def _ranges(value: object) -> object:
@@ -141,40 +52,34 @@ def _ranges(value: object) -> object:
 Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
 """As a sweep's samplers take them: for each key ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``."""
 _BODIES = ("dimers", "clusters", "mixture", "placed")
+_FEW_KINDS = Field(max_length=100)
+_FEW_BEADS = Field(max_length=MOST_BEADS)
 _IN_WORDS = ("run.cycles", "run.samples_per_cycle")
 """Keys with sources in words, which say more than their numbers: ``until constant within 0.2 %, at most 60``."""
 _ABOUT = ("document", "sources", "recorded_law", "uncertain")
 """Fields that comparisons leave out: sources of values, and the law as its run has recorded it."""
 
 
-class Case(Table):
-    """A case file: bodies on a boundary under a drive, with a liquid and contacts.
-
-    ``document`` has the tables that the case was read from, ``sources`` the `Source` of each value that they do not
-    give, and ``recorded_law`` is a user's law as a run has recorded it.
-    """
+class CaseFile(Table):
+    """A case file: bodies on a boundary under a drive, with a liquid and contacts."""
 
     title: Annotated[str, SAME_RUN] = key("Title of figures and reports. It does not change the results.", "")
     beads: Beads = key("")
-    dimers: Dimers | None = key("", None)
-    clusters: Annotated[tuple[Cluster, ...], Field(max_length=100)] = key("", ())
-    mixture: Mixture | None = key("", None)
-    placed: Annotated[tuple[PlacedBead, ...], Field(max_length=MOST_BEADS)] = key("", ())
+    dimers: DimersTable | None = key("", None)
+    clusters: Annotated[tuple[ClusterTable, ...], _FEW_KINDS] = key("", ())
+    mixture: MixtureTable | None = key("", None)
+    placed: Annotated[tuple[PlacedBeadTable, ...], _FEW_BEADS] = key("", ())
     boundary: Boundary = key("")
-    drive: Drive = key("")
-    liquid: Liquid = key("")
-    contact: Contact = key("")
-    run: Run = key("", Run())
+    drive: DriveTable = key("")
+    liquid: LiquidTable = key("")
+    contact: ContactTable = key("")
+    run: RunTable = key("", RunTable())
     environment: Environment = key("", Environment())
     uncertain: Annotated[Ranges, SAME_RUN] = key(
         "Ranges of values that are guesses, by dotted key: `[low, high]`, or `{ loguniform = [low, high] }`. "
         "See [](../../how-to/own-beads.md).",
         {},
     )
-    name: Annotated[Derived[str], SAME_RUN] = "case"
-    document: Annotated[Derived[dict[str, Any]], SAME_RUN] = Field({})
-    sources: Annotated[Derived[dict[str, Source]], SAME_RUN] = Field({})
-    recorded_law: Annotated[Derived[Any], SAME_RUN, Field(exclude=True)] = None
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
@@ -183,8 +88,149 @@ class Case(Table):
             yield Problem("dimers", None, "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
         run, loose = given.get("run", {}), given.keys() & {"mixture", "placed"}
         if loose and isinstance(run, Mapping) and not run.keys() & {"duration", "cycles"}:
-            yield Run.missing("duration", "run")
+            yield RunTable.missing("duration", "run")
         yield from super().problems(given, place)
+
+
+class Setup(CaseFile):
+    """A case with all values but those of its run, which is as the file says it.
+
+    Forces and the loads of contacts depend on nothing else.
+    """
+
+    dimers: Dimers | None
+    clusters: Annotated[tuple[Cluster, ...], _FEW_KINDS]
+    mixture: Mixture | None
+    placed: Annotated[tuple[PlacedBead, ...], _FEW_BEADS]
+    drive: Drive
+    liquid: Liquid
+    contact: Contact
+
+    @property
+    def walkers_by_key(self) -> dict[str, Walkers]:
+        """All makes of walkers by their keys, dimers first."""
+        dimers: dict[str, Walkers] = {} if self.dimers is None else {"dimers": self.dimers}
+        return {**dimers, **{f"clusters[{number}]": cluster for number, cluster in enumerate(self.clusters)}}
+
+    @cached_property
+    def walkers(self) -> tuple[Walkers, ...]:
+        """All makes of walkers, dimers first."""
+        return tuple(self.walkers_by_key.values())
+
+    @property
+    def excitation(self) -> Excitation:
+        """The oscillations of the drive."""
+        return self.drive.excitation
+
+    @property
+    def law(self) -> BridgeLaw:
+        """The law of its bridges."""
+        return by_name(self.liquid.law)
+
+    @cached_property
+    def bodies(self) -> tuple[Walkers | Mixture, ...]:
+        """All bodies of several beads, the walkers first."""
+        return (*self.walkers, *((self.mixture,) if self.mixture else ()))
+
+    @cached_property
+    def all_radii(self) -> list[float]:
+        """Radius of every bead, m."""
+        radii = [radius for body in self.bodies for radius in body.all_radii]
+        return [*radii, *(bead.radius for bead in self.placed)]
+
+    @property
+    def count(self) -> int:
+        """How many beads there are."""
+        return len(self.all_radii)
+
+    @property
+    def large(self) -> int:
+        """Number of large beads."""
+        return sum(radius > self.border for radius in self.all_radii)
+
+    @property
+    def radii(self) -> list[float]:
+        """The different radii of the beads, m, in the order of the bodies."""
+        radii = [radius for body in self.bodies for radius in body.radii]
+        return list(dict.fromkeys([*radii, *sorted(bead.radius for bead in self.placed)]))
+
+    @property
+    def loose(self) -> bool:
+        """Whether there are loose beads, which may form clusters."""
+        return self.mixture is not None or bool(self.placed)
+
+    @cached_property
+    def border(self) -> float:
+        """A radius above all small beads and below all large ones, m; infinite for a single class."""
+        if self.mixture is not None:
+            return (max(self.mixture.small_radii) + min(self.mixture.large_radii)) / 2.0
+        sizes = sorted(self.radii)
+        middle = (sizes[0] + sizes[-1]) / 2.0
+        small, large = ([size for size in sizes if (size > middle) is above] for above in (False, True))
+        return (small[-1] + large[0]) / 2.0 if large else inf
+
+    @property
+    def apart(self) -> bool:
+        """Whether the case has only walkers that are independent of each other."""
+        return bool(self.walkers) and not self.loose and not self.meets
+
+    @property
+    def meets(self) -> bool:
+        """Whether walkers may meet."""
+        return any(walkers.meet for walkers in self.walkers)
+
+    @cached_property
+    def shifted_rows(self) -> int:
+        """Even length of the rows of walkers if every second row begins facing left, so that neighbours meet; or 0."""
+        both = [walkers for walkers in self.walkers if walkers.facing == "both"]
+        if not self.meets or all(isclose(walkers.angle_spread, pi) for walkers in both):
+            return 0
+        rows = [x for x, _ in self.boundary.grid(sum(walkers.replicates for walkers in self.walkers), 1.0)]
+        length = rows.count(rows[0])
+        return length if length % 2 == 0 and length < len(rows) else 0
+
+    @property
+    def drive_axis(self) -> Vector:
+        """Direction of the largest harmonic (the first of equal ones) in the plane of the floor; x if it has none."""
+        x, y, _ = self.excitation.direction
+        length = hypot(x, y)
+        return (x / length, y / length, 0.0) if length else AXES["x"]
+
+    @property
+    def goes_uphill(self) -> bool:
+        """Whether the drive axis points uphill on a tilted floor; then right is up, and left is down."""
+        x, y, _ = self.drive_axis
+        uphill = (cos(self.boundary.uphill), sin(self.boundary.uphill))
+        return bool(self.boundary.tilt) and x * uphill[0] + y * uphill[1] > 1.0 - 1e-9
+
+    @property
+    def gravity_vector(self) -> Vector:
+        """Acceleration of gravity in the frame of the boundary, m/s²."""
+        return self.boundary.gravity(self.environment.gravity)
+
+    @property
+    def pressing_gravity(self) -> float:
+        """Component of gravity normal to the floor, m/s²."""
+        return -self.gravity_vector[2]
+
+    @property
+    def axial_gravity(self) -> float:
+        """Component of gravity against the drive axis, m/s²."""
+        return -sum(component * along for component, along in zip(self.gravity_vector, self.drive_axis, strict=True))
+
+
+class Case(Setup):
+    """A case with all values.
+
+    ``document`` has the tables that the case was read from, ``sources`` the `Source` of each value that they do not
+    give, and ``recorded_law`` is a user's law as a run has recorded it.
+    """
+
+    run: Run
+    name: Annotated[Derived[str], SAME_RUN] = "case"
+    document: Annotated[Derived[dict[str, Any]], SAME_RUN] = Field({})
+    sources: Annotated[Derived[dict[str, Source]], SAME_RUN] = Field({})
+    recorded_law: Annotated[Derived[Any], SAME_RUN, Field(exclude=True)] = None
 
     @cached_property
     def _values(self) -> tuple[Any, ...]:
@@ -193,14 +239,6 @@ class Case(Table):
     def as_dict(self) -> dict[str, Any]:
         """The whole case as plain JSON types, SI units, with the tables it was read from and its values' sources."""
         return self.model_dump(mode="json")
-
-    def filled(self, name: str, value: Any, why: str = "", origin: Whence = "derived") -> Case:
-        """The case with a value of a key that its file does not give."""
-        return self.put(name, value).noted(name, why, origin)
-
-    def noted(self, name: str, why: str, origin: Whence = "derived", text: str = "") -> Case:
-        """The case with the source of a value of a key."""
-        return self.but(sources={**self.sources, name: Source(origin, why, text)})
 
     def for_cycles(self, cycles: int) -> Case:
         """The same case with a fixed number of cycles in one segment."""
@@ -251,47 +289,10 @@ class Case(Table):
         return f"<table><caption>{escape(self.title or self.name)}</caption>{rows}</table>"
 
     @property
-    def walkers_by_key(self) -> dict[str, Walkers]:
-        """All makes of walkers by their keys, dimers first."""
-        dimers: dict[str, Walkers] = {} if self.dimers is None else {"dimers": self.dimers}
-        return {**dimers, **{f"clusters[{number}]": cluster for number, cluster in enumerate(self.clusters)}}
-
-    @cached_property
-    def walkers(self) -> tuple[Walkers, ...]:
-        """All makes of walkers, dimers first."""
-        return tuple(self.walkers_by_key.values())
-
-    @property
-    def excitation(self) -> Excitation:
-        """The oscillations of the drive."""
-        return self.drive.excitation
-
-    @property
     def law(self) -> BridgeLaw:
         """The law of its bridges: as its run has recorded it, else the law of the liquid."""
-        law: BridgeLaw = self.recorded_law or by_name(self.liquid.law)
+        law: BridgeLaw = self.recorded_law or super().law
         return law
-
-    @cached_property
-    def bodies(self) -> tuple[Walkers | Mixture, ...]:
-        """All bodies of several beads, the walkers first."""
-        return (*self.walkers, *((self.mixture,) if self.mixture else ()))
-
-    @cached_property
-    def all_radii(self) -> list[float]:
-        """Radius of every bead, m."""
-        radii = [radius for body in self.bodies for radius in body.all_radii]
-        return [*radii, *(bead.radius for bead in self.placed)]
-
-    @property
-    def count(self) -> int:
-        """How many beads there are."""
-        return len(self.all_radii)
-
-    @property
-    def large(self) -> int:
-        """Number of large beads."""
-        return sum(radius > self.border for radius in self.all_radii)
 
     @property
     def duration(self) -> float:
@@ -299,76 +300,6 @@ class Case(Table):
         return self.run.cycles / self.excitation.frequency
 
     @property
-    def radii(self) -> list[float]:
-        """The different radii of the beads, m, in the order of the bodies."""
-        radii = [radius for body in self.bodies for radius in body.radii]
-        return list(dict.fromkeys([*radii, *sorted(bead.radius for bead in self.placed)]))
-
-    @property
-    def loose(self) -> bool:
-        """Whether there are loose beads, which may form clusters."""
-        return self.mixture is not None or bool(self.placed)
-
-    @cached_property
-    def border(self) -> float:
-        """A radius above all small beads and below all large ones, m; infinite for a single class."""
-        if self.mixture is not None:
-            return (max(self.mixture.small_radii) + min(self.mixture.large_radii)) / 2.0
-        sizes = sorted(self.radii)
-        middle = (sizes[0] + sizes[-1]) / 2.0
-        small, large = ([size for size in sizes if (size > middle) is above] for above in (False, True))
-        return (small[-1] + large[0]) / 2.0 if large else inf
-
-    @property
-    def apart(self) -> bool:
-        """Whether the case has only walkers that are independent of each other."""
-        return bool(self.walkers) and not self.loose and not self.meets
-
-    @property
     def independent(self) -> bool:
         """Whether its walkers are so wherever they stand, so that others' may stand beside them in a deck."""
         return self.apart and self.run.in_one and self.boundary.bare
-
-    @property
-    def meets(self) -> bool:
-        """Whether walkers may meet."""
-        return any(walkers.meet for walkers in self.walkers)
-
-    @cached_property
-    def shifted_rows(self) -> int:
-        """Even length of the rows of walkers if every second row begins facing left, so that neighbours meet; or 0."""
-        both = [walkers for walkers in self.walkers if walkers.facing == "both"]
-        if not self.meets or all(isclose(walkers.angle_spread, pi) for walkers in both):
-            return 0
-        rows = [x for x, _ in self.boundary.grid(sum(walkers.replicates for walkers in self.walkers), 1.0)]
-        length = rows.count(rows[0])
-        return length if length % 2 == 0 and length < len(rows) else 0
-
-    @property
-    def drive_axis(self) -> Vector:
-        """Direction of the largest harmonic (the first of equal ones) in the plane of the floor; x if it has none."""
-        x, y, _ = self.excitation.direction
-        length = hypot(x, y)
-        return (x / length, y / length, 0.0) if length else AXES["x"]
-
-    @property
-    def goes_uphill(self) -> bool:
-        """Whether the drive axis points uphill on a tilted floor; then right is up, and left is down."""
-        x, y, _ = self.drive_axis
-        uphill = (cos(self.boundary.uphill), sin(self.boundary.uphill))
-        return bool(self.boundary.tilt) and x * uphill[0] + y * uphill[1] > 1.0 - 1e-9
-
-    @property
-    def gravity_vector(self) -> Vector:
-        """Acceleration of gravity in the frame of the boundary, m/s²."""
-        return self.boundary.gravity(self.environment.gravity)
-
-    @property
-    def pressing_gravity(self) -> float:
-        """Component of gravity normal to the floor, m/s²."""
-        return -self.gravity_vector[2]
-
-    @property
-    def axial_gravity(self) -> float:
-        """Component of gravity against the drive axis, m/s²."""
-        return -sum(component * along for component, along in zip(self.gravity_vector, self.drive_axis, strict=True))

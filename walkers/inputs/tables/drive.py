@@ -19,7 +19,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 from walkers.arrays import FloatArray, Vector
 from walkers.errors import Problem, unusable
 from walkers.inputs import units
-from walkers.inputs.config_table import Choice, Filled, Indirect, Table, key
+from walkers.inputs.config_table import Choice, Indirect, Table, key
 from walkers.inputs.records.record import FEWEST_PERIODS, Record, course_text, record_of
 from walkers.inputs.units import Angle, Coefficient
 
@@ -38,6 +38,7 @@ WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
 """Of the acceleration: multiples of the frequency and shares of the peak. A triangle's series is cut at 0.96 of it."""
 _LINE_ALONE = 0.95  # share of the largest acceleration of a record below which its line is named beside it
 _FEW = 3
+_FEW_ENOUGH = Field(max_length=24)
 _SAME_TIME = 1e-9  # relative error of times, and of numbers of cycles
 MOST_PERIODS = 1000
 """Largest number of periods of the fastest sine in a cycle."""
@@ -76,17 +77,30 @@ _Factors = Annotated[
 ]
 
 
-class Harmonic(Table):
-    """One of ``[[drive.harmonics]]``: A sin(2π f t + φ) along a direction, frequency f, peak acceleration A (2πf)²."""
+class _SineTable(Table):
+    """A sine A sin(2π f t + φ) along a direction: its keys in ``[drive]`` and in ``[[drive.harmonics]]``."""
 
     choices: ClassVar[tuple[Choice, ...]] = (Choice("peak_acceleration or gamma0"),)
-    axis: Filled[_Direction] = key("Direction of the shaking. Default: `x`; in containers `z`.", None)
-    frequency: units.Frequency = key("Frequency in cycles per second.")
-    peak_acceleration: Filled[units.Acceleration] = key("Peak acceleration of the boundary; `g` is 9.8 m/s².", None)
+    axis: _Direction | None = key("Direction of the shaking. Default: `x`; in containers `z`.", None)
+    frequency: units.Frequency | None = key("Frequency in cycles per second.", None)
+    peak_acceleration: units.Acceleration | None = key("Peak acceleration of the boundary; `g` is 9.8 m/s².", None)
     gamma0: Indirect[Coefficient] = key(
         "Γ0 = a0 M/(4πγR̄) of the dimer of mass M and mean radius R̄, instead of a0.", None, 0.5
     )
     phase: Angle = key("Phase of the sine.", 0.0)
+
+
+class HarmonicTable(_SineTable):
+    """One of ``[[drive.harmonics]]``: A sin(2π f t + φ) along a direction, frequency f, peak acceleration A (2πf)²."""
+
+    frequency: units.Frequency = key("Frequency in cycles per second.")
+
+
+class Harmonic(HarmonicTable):
+    """A harmonic of a resolved case."""
+
+    axis: _Direction
+    peak_acceleration: units.Acceleration
 
     @property
     def direction(self) -> Vector:
@@ -109,7 +123,7 @@ class Harmonic(Table):
         return self.peak_acceleration / self.angular_frequency
 
 
-class Drive(Harmonic):
+class DriveTable(_SineTable):
     """``[drive]``: one harmonic by its keys, or several as ``[[drive.harmonics]]``.
 
     In the ``frame`` of the container, as is usual, the beads feel the inertial force; in the frame of the laboratory
@@ -121,7 +135,6 @@ class Drive(Harmonic):
         Choice("frequency or harmonics or record"),
         *(Choice(f"{name} or record", required=False) for name in ("axis", "phase", "waveform")),
     )
-    frequency: Filled[units.Frequency] = key("Frequency in cycles per second.", None)
     waveform: Literal["sine", "triangle", "sawtooth"] = key(
         "Waveform of the acceleration. `triangle` and `sawtooth` contain harmonics up to the 9th.", "sine"
     )
@@ -129,13 +142,13 @@ class Drive(Harmonic):
         "`container`: the beads feel the inertial force. `lab`: the boundary moves. Velocities agree within 10⁻⁶.",
         "container",
     )
-    harmonics: Annotated[tuple[Harmonic, ...], Field(max_length=24)] = key("Several harmonics.", ())
-    record: Filled[_Recorded] = key(
+    harmonics: Annotated[tuple[HarmonicTable, ...], _FEW_ENOUGH] = key("Several harmonics.", ())
+    record: _Recorded | None = key(
         "File with the acceleration of the boundary against time. See [](../cases.md#recorded-shaking).",
         None,
         "trace.csv",
     )
-    repeats: Filled[units.Flag] = key("Whether the record is a period, which repeats. Default: false.", None)
+    repeats: units.Flag | None = key("Whether the record is a period, which repeats. Default: false.", None)
     ramp: _Factors = key(
         "Times after the start of the drive and factors of the displacement, which is linear in between.",
         (),
@@ -148,19 +161,39 @@ class Drive(Harmonic):
         if not given.get("harmonics"):
             yield from super().problems(given, place)
             return
-        for name in sorted(given.keys() & {*Harmonic.model_fields, "waveform", "record"}):
-            instead = f": write {place}.harmonics[0].{name}" if name in Harmonic.model_fields else ""
+        for name in sorted(given.keys() & {*HarmonicTable.model_fields, "waveform", "record"}):
+            instead = f": write {place}.harmonics[0].{name}" if name in HarmonicTable.model_fields else ""
             yield Problem(f"{place}.{name}", None, f"expected none beside {place}.harmonics{instead}")
+
+
+class Drive(DriveTable):
+    """The drive of a resolved case: a record, several harmonics, or a single one by the keys of the table.
+
+    With a record or several harmonics, the keys of the single one have no values.
+    """
+
+    harmonics: Annotated[tuple[Harmonic, ...], _FEW_ENOUGH]
 
     @cached_property
     def excitation(self) -> Excitation:
-        """The sum of sines that the resolved keys describe."""
+        """The sum of sines that the keys describe, or the record."""
         if self.record:
             return Excitation((), self.frame, self.record.but(repeats=bool(self.repeats)), self.ramp)
-        names = ("axis", "frequency", "peak_acceleration", "phase")
-        sines = [Harmonic(**{name: getattr(sine, name) for name in names}) for sine in self.harmonics or (self,)]
-        harmonics = tuple(sines) if self.harmonics else waveform(self.waveform, sines[0])
+        if self.harmonics:
+            harmonics = tuple(_sine(harmonic) for harmonic in self.harmonics)
+        else:
+            harmonics = waveform(self.waveform, _sine(self))
         return Excitation(harmonics, self.frame, ramp=self.ramp)
+
+
+def _sine(table: _SineTable) -> Harmonic:
+    """The harmonic that the keys of a table describe, without those that act through others."""
+    return Harmonic(
+        axis=table.axis,
+        frequency=table.frequency,
+        peak_acceleration=table.peak_acceleration,
+        phase=table.phase,
+    )
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, refused
 from walkers.files import read_json, write_json
+from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.loads import gravity_warnings, softness_warning
-from walkers.inputs.tables.run import limits_of
 from walkers.postprocess.measure import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.measure.caption import conditions
 from walkers.postprocess.measure.measuring_module import MeasuringModule

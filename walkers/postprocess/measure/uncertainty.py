@@ -12,8 +12,8 @@ from typing import Any
 from walkers.errors import refused
 from walkers.files import read_json
 from walkers.inputs.origins import Origin
+from walkers.inputs.resolving.from_library import OF_LIQUIDS
 from walkers.inputs.resolving.library import unmeasured
-from walkers.inputs.resolving.steps import OF_LIQUIDS
 from walkers.runner.manifest import check_unchanged
 
 SPREAD = "-spread"

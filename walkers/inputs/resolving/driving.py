@@ -1,0 +1,97 @@
+"""The drive of a case with all values: axes, and peak accelerations by the Γ0 of a dimer."""
+
+from __future__ import annotations
+
+from math import dist
+from typing import Any
+
+from walkers.errors import unusable
+from walkers.inputs.config_table import present
+from walkers.inputs.resolving.notes import Notes
+from walkers.inputs.tables.boundary import Boundary
+from walkers.inputs.tables.drive import Drive, DriveTable, Harmonic, HarmonicTable, check_drive, common_frequency
+from walkers.inputs.units import ACCELERATION, quantity_text
+from walkers.physics.dimer import Dimer
+
+_MEET = 0.01  # largest difference of the ends of a record that repeats, over its peak acceleration
+
+
+def drive_of(table: DriveTable, boundary: Boundary, dimer: Dimer | None, notes: Notes) -> Drive:
+    """Complete a drive by the axes and the peak accelerations of its harmonics.
+
+    Parameters
+    ----------
+    table
+        The drive as the file says it.
+    boundary
+        The boundary; containers are shaken along z, others along x.
+    dimer
+        The first walkers, to which Γ0 refers; None if they are no dimers.
+    notes
+        Get the sources of the axes and the peak accelerations.
+
+    Raises
+    ------
+    InputError
+        If the keys contradict each other, or the drive is too strong, too fast, or too short.
+    """
+    if table.record:
+        return _recorded_drive(table, notes)
+    if table.repeats:
+        raise unusable("drive.repeats", "expected none without drive.record")
+    if table.harmonics:
+        harmonics: list[Harmonic] = []
+        for number, harmonic in enumerate(table.harmonics):
+            values = _axis_and_peak(harmonic, f"drive.harmonics[{number}]", boundary, dimer, notes)
+            harmonics.append(harmonic.completed(Harmonic, values))
+        drive = table.completed(Drive, {"harmonics": tuple(harmonics)})
+    else:
+        drive = table.completed(Drive, _axis_and_peak(table, "drive", boundary, dimer, notes))
+    _check_harmonics(drive)
+    check_drive(drive.excitation)
+    return drive
+
+
+def _axis_and_peak(
+    sine: DriveTable | HarmonicTable, key: str, boundary: Boundary, dimer: Dimer | None, notes: Notes
+) -> dict[str, Any]:
+    """Values of the keys ``axis`` and ``peak_acceleration`` (m/s²) of a sine, whose table has the dotted ``key``."""
+    axis, peak = sine.axis, sine.peak_acceleration
+    if axis is None:
+        axis = "z" if boundary.closed else "x"
+        notes.add(f"{key}.axis", f"of a {boundary.shape}", "default")
+    if sine.gamma0 is not None:
+        if dimer is None:
+            raise unusable(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")
+        peak = dimer.peak_acceleration(sine.gamma0)
+        notes.add(f"{key}.peak_acceleration", "from gamma0, the dimer and the liquid")
+    return {"axis": axis, "peak_acceleration": peak}
+
+
+def _check_harmonics(drive: Drive) -> None:
+    """Refuse harmonics without a common period, and those that walls in the frame ``lab`` cannot follow."""
+    excitation = drive.excitation
+    try:
+        common_frequency([harmonic.frequency for harmonic in excitation.harmonics])
+    except ValueError as error:
+        raise unusable("drive.harmonics", f"expected frequencies with a common period: {error}") from error
+    if drive.frame == "lab" and not excitation.is_plain:
+        message = "several harmonics, or one with a phase, are driven in the container's frame"
+        raise unusable("drive.frame", f'expected "container": {message}')
+
+
+def _recorded_drive(table: DriveTable, notes: Notes) -> Drive:
+    """The drive by a record, with notes of its frequency and peak acceleration."""
+    drive = table.completed(Drive, {})
+    excitation = drive.excitation
+    record = present(excitation.record, "drive.record")
+    first, last = (record.rows[end][1:] for end in (0, -1))
+    if record.repeats and dist(first, last) > _MEET * record.largest(2):
+        raise unusable("drive.repeats", "expected a record that ends with the first row of the next period")
+    check_drive(excitation)
+    why = "all lines are multiples" if record.repeats else "the strongest line"
+    frequency = f"{excitation.frequency:.6g} Hz"
+    peak = quantity_text(excitation.peak_acceleration, ACCELERATION)
+    notes.add("drive.frequency", f"of the spectrum of the record: {why}", text=frequency)
+    notes.add("drive.peak_acceleration", "of the record, without its offset", text=peak)
+    return drive

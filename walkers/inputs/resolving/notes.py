@@ -1,0 +1,18 @@
+"""Notes about the values of a case that its file does not give, taken while they are resolved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from walkers.inputs.origins import Source, Whence
+
+
+class Notes:
+    """Sources of the values that a file does not give, by their keys."""
+
+    def __init__(self, sources: Mapping[str, Source]) -> None:
+        self.sources = dict(sources)
+
+    def add(self, name: str, why: str, origin: Whence = "derived", text: str = "") -> None:
+        """Note why a key has its value; ``text`` is the value in words, if its number does not say it."""
+        self.sources[name] = Source(origin, why, text)

@@ -1,0 +1,115 @@
+"""Materials, liquid and contacts of a case, and gravity."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Annotated, ClassVar
+
+from walkers.inputs import units
+from walkers.inputs.config_table import Choice, Indirect, Table, key
+from walkers.inputs.units import Coefficient, Number
+from walkers.physics.capillary import DEFAULT_LAW, BridgeLiquid
+
+STIFFEST = 1e11
+"""Largest Young's modulus of the contacts of a case, Pa: as hard as glass or steel; runs take a day."""
+_SOFTENED = Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFEST)]
+
+
+class Beads(Table):
+    """``[beads]``: the material of all beads."""
+
+    material: Indirect[str] = key("Material of all beads, from the library, which gives the density.", None, "ruby")
+    density: units.Density = key("Density of the beads.")
+
+
+class LiquidTable(Table):
+    """``[liquid]``: a name from the library, numbers, or both (numbers take precedence)."""
+
+    choices: ClassVar = (
+        Choice("dynamic_viscosity or kinematic_viscosity", instead="a liquid of the library"),
+        Choice("volume_fraction or meniscus_radius"),
+    )
+    name: Indirect[str] = key("Liquid from the library. The other keys override its values.", None, "Si AK5")
+    mass_fraction: Indirect[Number] = key("Mass fraction of glycerol in `water-glycerol`.", None, 0.87, ge=0, le=1)
+    temperature: Indirect[units.Temperature] = key("Temperature of `water-glycerol`. Default: 20 °C.", None)
+    surface_tension: units.SurfaceTension = key("Surface tension.")
+    density: Indirect[units.Density] = key("Density of the liquid.", None)
+    kinematic_viscosity: Indirect[units.KinematicViscosity] = key("Kinematic viscosity.", None)
+    dynamic_viscosity: units.DynamicViscosity | None = key("Dynamic viscosity, instead of the kinematic one.", None)
+    volume_fraction: Number | None = key(
+        "Ratio of the volumes of liquid and bead. The bridges share the liquid.", None, 0.01, ge=1e-9, le=0.5
+    )
+    meniscus_radius: units.Length | None = key(
+        "Radius of the menisci of all bridges, which exchange liquid through the film on a wetted plate.", None, "70 um"
+    )
+    viscosity_ratio: Number = key("Factor of the viscosity of the bridges. It scales their drag.", 1.0, ge=0, le=1e4)
+    contact_angle: units.UpToRightAngle = key(
+        "Contact angle at every bridge. A case whose bridges push the beads of a walker apart at rest is refused."
+    )
+    conserved: units.Flag = key(
+        "Whether bridges take their liquid from the films of their beads, and give it back. For piles.", False
+    )
+    law: str = key("Law of the bridges. See [](../../how-to/bridge-law.md).", DEFAULT_LAW)
+
+
+class Liquid(LiquidTable):
+    """The liquid of a resolved case; its bridges have either a ``volume_fraction`` or a ``meniscus_radius``."""
+
+    dynamic_viscosity: units.DynamicViscosity
+
+    @cached_property
+    def of_bridges(self) -> BridgeLiquid:
+        """What the bridges' law and their tables need of it."""
+        return BridgeLiquid(
+            surface_tension=self.surface_tension,
+            viscosity=float(f"{self.dynamic_viscosity * self.viscosity_ratio:.15g}"),
+            volume_fraction=self.volume_fraction or 0.0,
+            meniscus_radius=self.meniscus_radius or 0.0,
+            contact_angle=self.contact_angle,
+            conserved=self.conserved,
+            law=self.law,
+        )
+
+
+class Friction(Table):
+    """``[contact.friction]``: Coulomb coefficients."""
+
+    bead_bead: Coefficient = key("Coulomb coefficient between two beads.", example=0.25)
+    bead_wall: Coefficient = key("Coulomb coefficient between a bead and the boundary.", example=0.25)
+
+
+class Roughness(Table):
+    """``[contact.roughness]``: gap that remains for the liquid between surfaces that touch at their asperities."""
+
+    bead_bead: units.Length = key("Roughness of a contact of two beads: the root of both squares.", example="30 nm")
+    bead_wall: units.Length = key("Roughness of a contact of a bead and the boundary.", example="30 nm")
+
+
+class ContactTable(Table):
+    """``[contact]``: the model of the contacts, with the Young's modulus of softened beads and walls.
+
+    The modulus of ``"auto"`` is 50 MPa for loose beads; for walkers it is the lowest of 50, 200, 800, ... MPa at which
+    bridges hardly delay the contacts (`walkers.inputs.resolving.loads.delay`).
+    """
+
+    friction: Friction = key("")
+    roughness: Roughness = key("")
+    rolling_friction: Coefficient = key("Coefficient of rolling friction (constant directional torque).", example=0.01)
+    restitution: Number = key("Coefficient of restitution of the dry contact.", example=0.5, gt=0.05, le=1)
+    youngs_modulus: Annotated[_SOFTENED | None, units.AUTO] = key(
+        "Young's modulus of beads and boundary: lower than the real one, so that the time step can be longer.", None
+    )
+    poissons_ratio: Number = key("Poisson's ratio.", 0.3, ge=0, lt=0.5)
+
+
+class Contact(ContactTable):
+    """The contacts of a resolved case."""
+
+    youngs_modulus: _SOFTENED
+
+
+class Environment(Table):
+    """``[environment]``."""
+
+    gravity: Annotated[float, replace(units.ACCELERATION, example="9.81 m/s^2")] = key("Acceleration of gravity.", 9.81)
