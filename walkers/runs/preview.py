@@ -46,7 +46,7 @@ def notes(case: Case) -> list[str]:
     numbers = {"large": case.large, "small": case.count - case.large}
     lines += [f"no {name} beads; in the paper, large beads lead small ones" for name in numbers if not numbers[name]]
     filled = _volume(case) / (_LOOSE_PACKING * case.boundary.cross_section)
-    room = 2.0 * case.boundary.height - filled
+    room = 2.0 * case.boundary.inner_height - filled
     if not case.run.until and (fastest := room / case.duration) < _FASTEST_CLIMB:
         end = "rise above twice boundary.height, and end the run early"
         lines.append(f"climbers faster than {fastest * 1e3:.1f} mm/s {end}")

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 from walkers.arrays import FloatArray, Vector
 from walkers.errors import Problem
 from walkers.inputs import units
-from walkers.inputs.config_table import SAME_RUN, Derived, Indirect, Table, key, within
+from walkers.inputs.config_table import SAME_RUN, Derived, Indirect, Table, key, present, within
 from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.tables.shapes.registry import SHAPES, ShapeName
 from walkers.inputs.tables.shapes.shape import Layer, Shape
@@ -76,6 +76,16 @@ class Boundary(Table):
     def geometry(self) -> Shape:
         """The shape with its sizes."""
         return _geometry_of(self)
+
+    @property
+    def inner_width(self) -> float:
+        """Width of a channel or a container, m; raises `InputError` if the shape has none."""
+        return present(self.width, "boundary.width")
+
+    @property
+    def inner_height(self) -> float:
+        """Height of a container, m; raises `InputError` if the shape has none."""
+        return present(self.height, "boundary.height")
 
     @property
     def closed(self) -> bool:

@@ -157,8 +157,8 @@ def _state_of(motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[
 
 def _surface_cells(position: FloatArray, radius: FloatArray, container: Boundary, cell: float) -> FloatArray:
     """Height of the highest bead top in each x-y cell with beads, m."""
-    across = max(1, int(container.width / cell))
-    place = np.clip(((position[:, :2] / container.width + 0.5) * across).astype(int), 0, across - 1)
+    across = max(1, int(container.inner_width / cell))
+    place = np.clip(((position[:, :2] / container.inner_width + 0.5) * across).astype(int), 0, across - 1)
     tops = np.full(across * across, -np.inf)
     np.maximum.at(tops, place[:, 0] * across + place[:, 1], position[:, 2] + radius)
     highest: FloatArray = tops[np.isfinite(tops)]

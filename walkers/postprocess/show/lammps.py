@@ -33,7 +33,7 @@ def write_trajectory(directory: Path, destination: Path | None = None, *, every:
     radius, count = motion.radius[:, None], len(motion.radius)
     low, high = (motion.position - radius).min(axis=(0, 1)), (motion.position + radius).max(axis=(0, 1))
     if motion.case.boundary.closed:
-        half = motion.case.boundary.width / 2.0
+        half = motion.case.boundary.inner_width / 2.0
         low[:2], high[:2] = np.minimum(low[:2], -half), np.maximum(high[:2], half)
     low[2] = min(low[2], 0.0)
     bounds = "".join(f"{_MM * begin:.10g} {_MM * end:.10g}\n" for begin, end in zip(low, high, strict=True))

@@ -142,7 +142,7 @@ class Scene:
         seen, radius = 1e3 * seen @ axes.T, 1e3 * motion.radius[:, None]
         low, high = (seen - radius).min(axis=(0, 1)), (seen + radius).max(axis=(0, 1))
         if motion.case.boundary.closed and path is None:
-            half = 5e2 * motion.case.boundary.width * np.array([1.0, axes[2, 2] > 0.5])  # from above also across
+            half = 5e2 * motion.case.boundary.inner_width * np.array([1.0, axes[2, 2] > 0.5])  # from above also across
             low[:2], high[:2] = np.minimum(low[:2], -half), np.maximum(high[:2], half)
         wider = (share - 1.0) / 2.0 * (high - low)
         return cls(motion, axes, low - wider, high + wider, **options)
