@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Collection, Iterator, Mapping
 from functools import cache, cached_property
-from typing import Annotated, Any, ClassVar, NamedTuple, Self, TypeVar, get_args, get_origin
+from typing import Annotated, Any, ClassVar, Self, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
 from pydantic.fields import FieldInfo
@@ -41,22 +41,30 @@ def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **b
     return Field(default, description=meaning, examples=None if example is None else [example], **bounds)
 
 
-class Choice(NamedTuple):
-    """Keys that exclude each other: a table has one of the expressions, at most one, or something ``instead``."""
+class Choice:
+    """Keys that exclude each other: a table has those of one expression.
 
-    text: str  # such as ``radii or mean_radius and sin_delta``
-    required: bool = True
-    instead: str = ""
+    Parameters
+    ----------
+    *expressions
+        The keys of each expression, such as ``("radii",), ("mean_radius", "sin_delta")``.
+    required
+        Whether a table without any of these keys is refused.
+    instead
+        In words, what may stand in the place of these keys.
+    """
 
-    @property
-    def expressions(self) -> list[list[str]]:
-        """The keys of each expression."""
-        return [expression.split(" and ") for expression in self.text.split(" or ")]
+    def __init__(self, *expressions: tuple[str, ...], required: bool = True, instead: str = "") -> None:
+        self.expressions = expressions
+        self.required = required
+        self.instead = instead
 
     def excluded_by(self, name: str) -> set[str]:
         """Keys that a key excludes."""
         without = [names for names in self.expressions if name not in names]
-        return {key for names in without for key in names} if len(without) < len(self.expressions) else set()
+        if len(without) == len(self.expressions):
+            return set()
+        return {key for names in without for key in names}
 
 
 class Table(BaseModel):

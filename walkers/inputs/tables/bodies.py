@@ -72,7 +72,7 @@ class Walkers(WalkerGeometry, WalkersTable):
 class DimersTable(WalkersTable):
     """``[dimers]``: walkers of two beads."""
 
-    choices: ClassVar = (Choice("radii or diameters or mean_radius and sin_delta"),)
+    choices: ClassVar = (Choice(("radii",), ("diameters",), ("mean_radius", "sin_delta")),)
     radii: tuple[Radius, Radius] | None = key("Radii of the beads. The first bead leads.", None, ["0.3 mm", "0.2 mm"])
     diameters: Indirect[tuple[Diameter, Diameter]] = key("Diameters, instead of `radii`.", None, ["0.6 mm", "0.4 mm"])
     mean_radius: Indirect[Radius] = key("Mean radius, with `sin_delta` instead of `radii`.", None, "0.25 mm")
@@ -93,7 +93,7 @@ _THREE = ["0.3 mm", "0.2 mm", "0.2 mm"], ["0.6 mm", "0.4 mm", "0.4 mm"]
 class ClusterTable(WalkersTable):
     """One of ``[[clusters]]``: walkers of several beads, in an ``arrangement``, or ``at`` a place for each."""
 
-    choices: ClassVar = (Choice("radii or diameters"), Choice("arrangement or at"))
+    choices: ClassVar = (Choice(("radii",), ("diameters",)), Choice(("arrangement",), ("at",)))
     radii: _Radii | None = key("Radii of the beads. The first bead leads.", None, _THREE[0])
     diameters: Indirect[_Diameters] = key("Diameters, instead of `radii`.", None, _THREE[1])
     arrangement: str = key("`chain`, `fan`, `diamond` or `ring`. See [](../cases.md#bodies).", "", "fan")
@@ -114,9 +114,9 @@ class MixtureTable(Table):
     """``[mixture]``: poured beads of two classes, each of ``sizes`` radii within a range, which occur equally often."""
 
     choices: ClassVar = (
-        Choice("small or small_diameters"),
-        Choice("large or large_diameters"),
-        Choice("count or fill_height"),
+        Choice(("small",), ("small_diameters",)),
+        Choice(("large",), ("large_diameters",)),
+        Choice(("count",), ("fill_height",)),
     )
     small: _Range | None = key("Range of radii of the small beads.", None, ["0.3 mm", "0.315 mm"])
     large: _Range | None = key("Range of radii of the large beads.", None, ["0.5 mm", "0.59 mm"])
@@ -200,7 +200,7 @@ def share_and_volume(
 class PlacedBeadTable(Table):
     """One of ``[[placed]]``: a bead and where it begins, from the middle of the floor."""
 
-    choices: ClassVar = (Choice("radius or diameter"),)
+    choices: ClassVar = (Choice(("radius",), ("diameter",)),)
     radius: Radius | None = key("Radius of the bead.", None, "0.3 mm")
     diameter: Indirect[Diameter] = key("Diameter of the bead, instead of `radius`.", None, "0.6 mm")
     at: Position = key(

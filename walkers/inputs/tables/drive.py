@@ -80,7 +80,7 @@ _Factors = Annotated[
 class _SineTable(Table):
     """A sine A sin(2π f t + φ) along a direction: its keys in ``[drive]`` and in ``[[drive.harmonics]]``."""
 
-    choices: ClassVar[tuple[Choice, ...]] = (Choice("peak_acceleration or gamma0"),)
+    choices: ClassVar[tuple[Choice, ...]] = (Choice(("peak_acceleration",), ("gamma0",)),)
     axis: _Direction | None = key("Direction of the shaking. Default: `x`; in containers `z`.", None)
     frequency: units.Frequency | None = key("Frequency in cycles per second.", None)
     peak_acceleration: units.Acceleration | None = key("Peak acceleration of the boundary; `g` is 9.8 m/s².", None)
@@ -131,9 +131,11 @@ class DriveTable(_SineTable):
     """
 
     choices: ClassVar[tuple[Choice, ...]] = (
-        Choice("peak_acceleration or gamma0 or harmonics or record"),
-        Choice("frequency or harmonics or record"),
-        *(Choice(f"{name} or record", required=False) for name in ("axis", "phase", "waveform")),
+        Choice(("peak_acceleration",), ("gamma0",), ("harmonics",), ("record",)),
+        Choice(("frequency",), ("harmonics",), ("record",)),
+        Choice(("axis",), ("record",), required=False),
+        Choice(("phase",), ("record",), required=False),
+        Choice(("waveform",), ("record",), required=False),
     )
     waveform: Literal["sine", "triangle", "sawtooth"] = key(
         "Waveform of the acceleration. `triangle` and `sawtooth` contain harmonics up to the 9th.", "sine"

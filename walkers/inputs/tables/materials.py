@@ -27,8 +27,8 @@ class LiquidTable(Table):
     """``[liquid]``: a name from the library, numbers, or both (numbers take precedence)."""
 
     choices: ClassVar = (
-        Choice("dynamic_viscosity or kinematic_viscosity", instead="a liquid of the library"),
-        Choice("volume_fraction or meniscus_radius"),
+        Choice(("dynamic_viscosity",), ("kinematic_viscosity",), instead="a liquid of the library"),
+        Choice(("volume_fraction",), ("meniscus_radius",)),
     )
     name: Indirect[str] = key("Liquid from the library. The other keys override its values.", None, "Si AK5")
     mass_fraction: Indirect[Number] = key("Mass fraction of glycerol in `water-glycerol`.", None, 0.87, ge=0, le=1)

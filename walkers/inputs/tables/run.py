@@ -38,8 +38,8 @@ class RunTable(Table):
     """
 
     choices: ClassVar = (
-        Choice("cycles or duration or most_cycles", required=False),
-        Choice("samples_per_cycle or frames_per_second", required=False),
+        Choice(("cycles",), ("duration",), ("most_cycles",), required=False),
+        Choice(("samples_per_cycle",), ("frames_per_second",), required=False),
     )
     time_step: Annotated[units.Time | None, AUTO] = key(
         "Time step, or its upper limit: the program fits a whole number of samples into a cycle.", None

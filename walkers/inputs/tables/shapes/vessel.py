@@ -21,7 +21,7 @@ from walkers.inputs.tables.shapes.container import NEAREST, Container
 from walkers.inputs.tables.shapes.shape import LOOSE, Layer
 from walkers.inputs.tables.shapes.walls import Flat, Wall
 
-GIVEN_BY = Choice("mesh and scale or planes and height")
+GIVEN_BY = Choice(("mesh", "scale"), ("planes", "height"))
 """Keys that describe a vessel."""
 _PLACES_AT_ONCE = 5000
 """Places from which beads are poured whose distances from the walls are computed together."""
