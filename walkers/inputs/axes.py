@@ -169,18 +169,49 @@ def descending(key: str, ends: Mapping[str, Value]) -> Axis:
     return Axis.of({key: [written(start - step * count, unit) for count in range(number)]})
 
 
+class NotARange(ValueError):
+    """A value has none of the forms of a range; who asked for the range says which forms there are."""
+
+
 def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
     """The ranges of several keys, ``{ uniform = [low, high] }`` or ``{ loguniform = [low, median, high] }``."""
-    spans = {}
+    spans: dict[str, Range] = {}
     for key, given in flatten(ranges).items():
-        kind, ends = next(iter(given.items())) if isinstance(given, Mapping) and len(given) == 1 else ("", None)
-        if kind not in DISTRIBUTIONS or not (isinstance(ends, list) and len(ends) in (2, 3)):
-            raise unusable(key, "expected { uniform = [low, high] } or { loguniform = [low, high] }", given)
-        (low, *median, high), unit = _numbers(key, ends, positive=kind == "loguniform")
-        if low >= high or not all(low <= middle <= high for middle in median):
-            raise unusable(key, "expected the smaller value first", given)
-        spans[key] = Range(low, high, unit, kind == "loguniform", *median)
+        try:
+            spans[key] = range_of(key, given)
+        except NotARange as error:
+            message = "expected { uniform = [low, high] } or { loguniform = [low, high] }"
+            raise unusable(key, message, given) from error
     return spans
+
+
+def range_of(key: str, given: object) -> Range:
+    """The range of a key.
+
+    Parameters
+    ----------
+    key
+        The dotted key, for messages.
+    given
+        ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``; the median may stand between the ends.
+
+    Raises
+    ------
+    NotARange
+        If the value has another form.
+    InputError
+        If the ends are no numbers of one unit, the smaller one first.
+    """
+    if not isinstance(given, Mapping) or len(given) != 1:
+        raise NotARange(key)
+    distribution, ends = next(iter(given.items()))
+    if distribution not in DISTRIBUTIONS or not isinstance(ends, list) or len(ends) not in (2, 3):
+        raise NotARange(key)
+    logarithmic = distribution == "loguniform"
+    (low, *median, high), unit = _numbers(key, ends, positive=logarithmic)
+    if low >= high or not all(low <= middle <= high for middle in median):
+        raise unusable(key, "expected the smaller value first", given)
+    return Range(low, high, unit, logarithmic, *median)
 
 
 def unit_cube(dimensions: int, points: int, seed: int) -> FloatArray:

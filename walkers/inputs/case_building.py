@@ -11,7 +11,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from walkers.errors import InputError, Problem, apply_all, refused, unusable
-from walkers.inputs.axes import ranges_of
+from walkers.inputs.axes import NotARange, range_of
 from walkers.inputs.config_table import alternatives, changed, contradictions
 from walkers.inputs.keys import flatten, value_at
 from walkers.inputs.messages import blaming, check_key, validated
@@ -141,28 +141,38 @@ def _validated(tables: Mapping[str, Any], unknown: list[Problem], source: str) -
 
 
 def _check_uncertain(case: Case, tables: Mapping[str, Any], source: str, *, around: bool) -> None:
-    """Uncertain values are keys of the case, which could say both ends of the range."""
+    """Refuse uncertain values that are no keys of the case, or whose ends the case could not have."""
     written = flatten(tables.get("uncertain", {}))
 
     def check(name: str) -> None:
+        key = f"uncertain.{name}"
         try:
-            check_key(CaseFile, name)
-            if ranges_of({name: case.uncertain[name]})[name].median is not None:
-                raise unusable(name, "expected [low, high]: the case's own value is the median")
-            (ends,) = case.uncertain[name].values()
-            low, high = (
-                validated(CaseFile, changed(CaseFile, tables, {name: end}), source).value_of(name) for end in ends
-            )
-        except InputError as error:
-            message = error.problems[0].expected.replace("{ uniform = [low, high] }", "[low, high]")
-            raise unusable(f"uncertain.{name}", message, written[name]) from error
-        value, slack = case.value_of(name), 1e-9 * (high - low)
-        if value is None and (instead := sorted(key for key in alternatives(CaseFile, name) if case.value_of(key))):
-            message = f"expected {' or '.join(instead)}, which the case has instead"
-            raise unusable(f"uncertain.{name}", message, written[name])
+            low, high = _ends_of_range(name, case.uncertain[name], tables, source)
+        except NotARange as error:
+            message = "expected [low, high] or { loguniform = [low, high] }"
+            raise unusable(key, message, written[name]) from error
+        except InputError as error:  # of the key or of an end of its range
+            raise unusable(key, error.problems[0].expected, written[name]) from error
+        value = case.value_of(name)
+        if value is None:
+            instead = sorted(other for other in alternatives(CaseFile, name) if case.value_of(other))
+            if instead:
+                message = f"expected {' or '.join(instead)}, which the case has instead"
+                raise unusable(key, message, written[name])
+        slack = 1e-9 * (high - low)
         if around and isinstance(value, (int, float)) and not low - slack <= value <= high + slack:
             text = next((origin.text for origin in case.origins if origin.key == name), str(value))
             message = f"expected a range that holds the case's own value, {text}"
-            raise unusable(f"uncertain.{name}", message, written[name])
+            raise unusable(key, message, written[name])
 
     apply_all(check, case.uncertain)
+
+
+def _ends_of_range(name: str, given: Mapping[str, Any], tables: Mapping[str, Any], source: str) -> tuple[Any, Any]:
+    """The ends of the range of an uncertain key in SI units, each as the tables of the case would have it."""
+    check_key(CaseFile, name)
+    if range_of(name, given).median is not None:
+        raise unusable(name, "expected [low, high]: the case's own value is the median")
+    (ends,) = given.values()
+    low, high = (validated(CaseFile, changed(CaseFile, tables, {name: end}), source) for end in ends)
+    return low.value_of(name), high.value_of(name)
