@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
-from importlib import import_module
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +12,6 @@ from walkers.files import read_limited
 from walkers.inputs.keys import parts_of, value_at
 
 _MOST_BYTES = 16 << 20
-_FILES = {
-    "boundary.mesh": ("meshes", "meshes.mesh_file", "read_mesh"),
-    "drive.record": ("records", "records.record_file", "read_record"),
-}
-"""Keys that name files, the tables of their contents by these names, and their readers."""
 
 
 def toml_bytes(tables: Mapping[str, Any]) -> bytes:
@@ -47,15 +41,62 @@ def read_toml(path: Path) -> dict[str, Any]:
 def with_files(
     document: Mapping[str, Any], folder: Path = Path(), values: Iterable[tuple[str, object]] = ()
 ) -> dict[str, Any]:
-    """Tables of a case with the contents of the files in a folder that they name, or further values of keys."""
-    tables, values = dict(document), list(values)
-    for key, (table, module, reader) in _FILES.items():
-        contents = dict(below) if isinstance(below := tables.get(table), Mapping) else {}
-        named = (value_at(document, parts_of(key)), *(value for name, value in values if name == key))
-        for file in dict.fromkeys(value for value in named if isinstance(value, str) and value not in contents):
-            try:
-                contents[file] = getattr(import_module(f"walkers.inputs.{module}"), reader)(folder / file)
-            except ValueError as error:
-                raise unusable(key, str(error), file) from error
-        tables |= {table: contents} if contents else {}
+    """Add the contents of the files that a case names to its tables.
+
+    Parameters
+    ----------
+    document
+        The tables of a case.
+    folder
+        Where the files are.
+    values
+        Further keys and values that may name files, such as those of the axes of a sweep.
+
+    Returns
+    -------
+    dict
+        The tables; ``meshes`` and ``records`` have the contents of the files by their names.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read.
+    """
+    tables = dict(document)
+    values = list(values)
+    meshes = _unread(tables, "boundary.mesh", "meshes", values)
+    if meshes:
+        from walkers.inputs.meshes.mesh_file import read_mesh
+
+        tables["meshes"] = _contents(tables, "meshes") | _read("boundary.mesh", meshes, folder, read_mesh)
+    records = _unread(tables, "drive.record", "records", values)
+    if records:
+        from walkers.inputs.records.record_file import read_record
+
+        tables["records"] = _contents(tables, "records") | _read("drive.record", records, folder, read_record)
     return tables
+
+
+def _contents(tables: Mapping[str, Any], table: str) -> dict[str, Any]:
+    """Contents of files that tables already have, by the names of the files."""
+    contents = tables.get(table)
+    return dict(contents) if isinstance(contents, Mapping) else {}
+
+
+def _unread(tables: Mapping[str, Any], key: str, table: str, values: Sequence[tuple[str, object]]) -> list[str]:
+    """Names of files that a key has, or may have, and whose contents are not in a table yet."""
+    named = [value_at(tables, parts_of(key))]
+    named += [value for name, value in values if name == key]
+    known = _contents(tables, table)
+    return list(dict.fromkeys(name for name in named if isinstance(name, str) and name not in known))
+
+
+def _read(key: str, names: Iterable[str], folder: Path, read: Callable[[Path], Any]) -> dict[str, Any]:
+    """Contents of files in a folder by their names; a file that cannot be used is a problem of the key."""
+    contents: dict[str, Any] = {}
+    for name in names:
+        try:
+            contents[name] = read(folder / name)
+        except ValueError as error:
+            raise unusable(key, str(error), name) from error
+    return contents
