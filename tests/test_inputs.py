@@ -201,6 +201,34 @@ def test_a_case_is_kept_as_json(name: str) -> None:
             stored_case(damaged)  # type: ignore[arg-type]
 
 
+RESOLVED = {
+    "fig1b": ("run.time_step", "run.cycles", "contact.youngs_modulus", "dimers.radii", "dimers.spacing"),
+    "pile-ci": ("run.settling_cycles", "run.samples_per_cycle", "mixture.small", "liquid.dynamic_viscosity"),
+}
+
+
+@pytest.mark.parametrize(("name", "key"), [(name, key) for name, keys in RESOLVED.items() for key in keys])
+def test_a_resolved_case_lacks_no_value(name: str, key: str) -> None:
+    """A file may leave it out; stored values without it are those of no case."""
+    case = load_case(name)
+    table, last = key.split(".")
+    assert case.value_of(key) is not None
+    values = case.as_dict()
+    values[table][last] = None
+    with pytest.raises(ValueError, match=key):
+        stored_case(values)
+
+
+def test_a_harmonic_has_a_direction() -> None:
+    """Where its table leaves it out, resolving gives it."""
+    case = build_case({**document(), **ODD["harmonics"]})
+    assert [harmonic.axis for harmonic in case.drive.harmonics] == ["x", "y"]
+    values = case.as_dict()
+    values["drive"]["harmonics"][0]["axis"] = None
+    with pytest.raises(ValueError, match=r"drive\.harmonics\.0\.axis"):
+        stored_case(values)
+
+
 def test_the_schema_refuses_what_the_program_refuses(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """And keeps all shipped cases; a new case may name it, and is a case as it was without."""
     monkeypatch.setitem(sys.modules, "rfc3987_syntax", None)  # a grammar of addresses, which takes three seconds

@@ -46,7 +46,7 @@ MOST_PERIODS = 1000
 
 def _axis(value: object) -> object:
     """An axis by its name, or a direction by its components."""
-    if value in (None, "x", "y", "z"):
+    if value in ("x", "y", "z"):
         return value
     if isinstance(value, (list, tuple)) and len(value) == 3 and any(value):
         numbers = tuple(float(x) for x in value if type(x) in (int, float) and isfinite(x))
@@ -56,7 +56,7 @@ def _axis(value: object) -> object:
 
 
 _VECTOR = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
-_Direction = Annotated[Any, BeforeValidator(_axis), WithJsonSchema({"anyOf": [{"enum": list(AXES)}, _VECTOR]})]
+_Direction = Annotated[str | Vector, BeforeValidator(_axis), WithJsonSchema({"anyOf": [{"enum": list(AXES)}, _VECTOR]})]
 _Recorded = Annotated[Any, BeforeValidator(record_of), WithJsonSchema({"type": "string"})]
 Ramp = tuple[tuple[float, float], ...]
 
