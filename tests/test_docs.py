@@ -137,7 +137,7 @@ def test_numbers_and_outputs_on_pages_are_todays(
 def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a folder of the tests (``tmp``), with what a user would have imported."""
     if module == "walkers.api":  # its sweep is there for its table: Fig. 4b would take all of 60 cycles
-        monkeypatch.setattr("walkers.inputs.tables.run._MOST_CYCLES", 12)
+        monkeypatch.setattr("walkers.inputs.resolving.length._MOST_CYCLES", 12)
     failed, tried = doctest.testmod(import_module(module), extraglobs={"tmp": runs_folder, "walkers": walkers})
     assert tried
     assert not failed

@@ -36,7 +36,7 @@ def test_literature_prints_published_impacts_beside_ours(tmp_path: Path) -> None
 def test_paper_draws_what_is_asked_for_from_runs_that_it_makes_once(
     in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("walkers.inputs.tables.run._MOST_CYCLES", 12)  # of 60: Fig. 4b would take them all
+    monkeypatch.setattr("walkers.inputs.resolving.length._MOST_CYCLES", 12)  # of 60: Fig. 4b would take them all
     options = ("--only", "fig4", "--format", "svg", "--out", "mine")
     call(*options, "-j", "1", study="studies.paper", check=True)
     finished = {path: path.stat().st_mtime_ns for path in Path("mine").glob("*/manifest.json")}

@@ -1,4 +1,4 @@
-"""A `Case` from the tables of its file: completed, validated and resolved; and cases that were stored or are changed.
+"""A `Case` from the tables of its file, from what was stored, or from another case with changes.
 
 Files are found and read by `walkers.inputs.reading`.
 """
@@ -43,13 +43,14 @@ def build_case(
     changes
         Values that replace those of the document, by dotted keys, written as in a case file.
     around
-        Whether uncertain ranges must contain the values of the case. Points of a sweep may leave them.
+        Whether uncertain ranges must contain the values of the case. Points of a sweep may leave
+        them.
 
     Returns
     -------
     Case
-        All values in SI units; ``document`` contains the tables with the changes and the contents
-        of the files that they name.
+        All values in SI units; its ``document`` has the tables with the changes and the contents of
+        the files that they name.
 
     Raises
     ------
@@ -105,7 +106,7 @@ def changed_case(case: Case, changes: Mapping[str, Any]) -> Case:
 
 
 def stored_case(values: Mapping[str, Any]) -> Case:
-    """Read a case from what `Case.as_dict` returns; keys of earlier versions of the program are left out.
+    """Read a case from what `Case.as_dict` returns, without keys of earlier versions of the program.
 
     Raises
     ------
@@ -129,7 +130,7 @@ def _with_record(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def _validated(tables: Mapping[str, Any], unknown: list[Problem], source: str) -> CaseFile:
-    """The tables as a case file; ``unknown`` are problems of names that the library does not have."""
+    """The tables as a case file; ``unknown`` are problems of names that the library lacks."""
     try:
         return validated(CaseFile, tables, source, further=[*unknown, *contradictions(CaseFile, tables)])
     except InputError as error:
@@ -141,38 +142,44 @@ def _validated(tables: Mapping[str, Any], unknown: list[Problem], source: str) -
 
 
 def _check_uncertain(case: Case, tables: Mapping[str, Any], source: str, *, around: bool) -> None:
-    """Refuse uncertain values that are no keys of the case, or whose ends the case could not have."""
+    """Refuse uncertain values that are no keys, or whose ends the case could not have."""
     written = flatten(tables.get("uncertain", {}))
 
     def check(name: str) -> None:
-        key = f"uncertain.{name}"
+        place = f"uncertain.{name}"
         try:
             low, high = _ends_of_range(name, case.uncertain[name], tables, source)
         except NotARange as error:
             message = "expected [low, high] or { loguniform = [low, high] }"
-            raise unusable(key, message, written[name]) from error
+            raise unusable(place, message, written[name]) from error
         except InputError as error:  # of the key or of an end of its range
-            raise unusable(key, error.problems[0].expected, written[name]) from error
+            raise unusable(place, error.problems[0].expected, written[name]) from error
         value = case.value_of(name)
         if value is None:
-            instead = sorted(other for other in alternatives(CaseFile, name) if case.value_of(other))
+            instead = sorted(key for key in alternatives(CaseFile, name) if case.value_of(key))
             if instead:
                 message = f"expected {' or '.join(instead)}, which the case has instead"
-                raise unusable(key, message, written[name])
+                raise unusable(place, message, written[name])
         slack = 1e-9 * (high - low)
         if around and isinstance(value, (int, float)) and not low - slack <= value <= high + slack:
             text = next((origin.text for origin in case.origins if origin.key == name), str(value))
             message = f"expected a range that holds the case's own value, {text}"
-            raise unusable(key, message, written[name])
+            raise unusable(place, message, written[name])
 
     apply_all(check, case.uncertain)
 
 
-def _ends_of_range(name: str, given: Mapping[str, Any], tables: Mapping[str, Any], source: str) -> tuple[Any, Any]:
-    """The ends of the range of an uncertain key in SI units, each as the tables of the case would have it."""
+def _ends_of_range(
+    name: str,
+    given: Mapping[str, Any],
+    tables: Mapping[str, Any],
+    source: str,
+) -> tuple[Any, Any]:
+    """The ends of the range of an uncertain key, in SI units."""
     check_key(CaseFile, name)
     if range_of(name, given).median is not None:
         raise unusable(name, "expected [low, high]: the case's own value is the median")
     (ends,) = given.values()
-    low, high = (validated(CaseFile, changed(CaseFile, tables, {name: end}), source) for end in ends)
+    documents = (changed(CaseFile, tables, {name: end}) for end in ends)
+    low, high = (validated(CaseFile, document, source) for document in documents)
     return low.value_of(name), high.value_of(name)

@@ -126,8 +126,8 @@ class Table(BaseModel):
         Completed
             The model, validated: a value that is still missing is an error of the program.
         """
-        own = {name: getattr(self, name) for name in type(self).model_fields}
-        return model.model_validate({**own, **values})
+        former = {name: getattr(self, name) for name in type(self).model_fields}
+        return model.model_validate({**former, **values})
 
     def value_of(self, name: str) -> Any:
         """The value of a dotted key; None if there is no such place."""

@@ -68,12 +68,14 @@ def with_files(
     if meshes:
         from walkers.inputs.meshes.mesh_file import read_mesh
 
-        tables["meshes"] = _contents(tables, "meshes") | _read("boundary.mesh", meshes, folder, read_mesh)
+        contents = _read("boundary.mesh", meshes, folder, read_mesh)
+        tables["meshes"] = _contents(tables, "meshes") | contents
     records = _unread(tables, "drive.record", "records", values)
     if records:
         from walkers.inputs.records.record_file import read_record
 
-        tables["records"] = _contents(tables, "records") | _read("drive.record", records, folder, read_record)
+        contents = _read("drive.record", records, folder, read_record)
+        tables["records"] = _contents(tables, "records") | contents
     return tables
 
 
@@ -83,16 +85,27 @@ def _contents(tables: Mapping[str, Any], table: str) -> dict[str, Any]:
     return dict(contents) if isinstance(contents, Mapping) else {}
 
 
-def _unread(tables: Mapping[str, Any], key: str, table: str, values: Sequence[tuple[str, object]]) -> list[str]:
+def _unread(
+    tables: Mapping[str, Any],
+    key: str,
+    table: str,
+    values: Sequence[tuple[str, object]],
+) -> list[str]:
     """Names of files that a key has, or may have, and whose contents are not in a table yet."""
     named = [value_at(tables, parts_of(key))]
     named += [value for name, value in values if name == key]
-    known = _contents(tables, table)
-    return list(dict.fromkeys(name for name in named if isinstance(name, str) and name not in known))
+    contents = _contents(tables, table)
+    unread = (name for name in named if isinstance(name, str) and name not in contents)
+    return list(dict.fromkeys(unread))
 
 
-def _read(key: str, names: Iterable[str], folder: Path, read: Callable[[Path], Any]) -> dict[str, Any]:
-    """Contents of files in a folder by their names; a file that cannot be used is a problem of the key."""
+def _read(
+    key: str,
+    names: Iterable[str],
+    folder: Path,
+    read: Callable[[Path], Any],
+) -> dict[str, Any]:
+    """Contents of files in a folder by their names; an unusable file is a problem of the key."""
     contents: dict[str, Any] = {}
     for name in names:
         try:

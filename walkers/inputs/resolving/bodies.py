@@ -1,4 +1,4 @@
-"""Bodies of a case with all values: radii, directions and spacings of walkers, and the number of poured beads."""
+"""Bodies of a case with all values: radii, directions, spacings, and numbers of poured beads."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class WalkerDraft(NamedTuple):
 
 
 class MixtureDraft(NamedTuple):
-    """A mixture as the file says it, with the ranges of the radii of its small and large beads, m."""
+    """A mixture as the file says it, with the ranges of the radii of its beads, m."""
 
     table: MixtureTable
     small: tuple[float, float]
@@ -65,7 +65,8 @@ def walker_drafts(file: CaseFile, notes: Notes) -> dict[str, WalkerDraft]:
     drafts: dict[str, WalkerDraft] = {}
     if file.dimers is not None:
         radii = _radii_of_dimers(file.dimers, notes)
-        drafts["dimers"] = WalkerDraft(file.dimers, BareWalker(radii, Dimers.arrangement, Dimers.at))
+        geometry = BareWalker(radii, Dimers.arrangement, Dimers.at)
+        drafts["dimers"] = WalkerDraft(file.dimers, geometry)
     for number, cluster in enumerate(file.clusters):
         key = f"clusters[{number}]"
         radii = _radii(cluster.radii, cluster.diameters, f"{key}.radii", notes)
@@ -107,7 +108,14 @@ def placed_bead(table: PlacedBeadTable) -> PlacedBead:
 
 
 def mixture_of(draft: MixtureDraft, boundary: Boundary, notes: Notes) -> Mixture:
-    """A mixture with its number of beads; raises `InputError` if its beads or its boundary are none for a pile."""
+    """Complete a mixture by its number of beads.
+
+    Raises
+    ------
+    InputError
+        If its small beads are not the smaller ones, its boundary is no container, or a given height
+        takes no beads, or too many.
+    """
     table = draft.table
     if max(draft.small_radii) >= min(draft.large_radii):
         raise unusable("mixture.large", "expected radii above those of the small beads")
@@ -198,8 +206,12 @@ def _check_places(cluster: WalkerGeometry, key: str) -> None:
         raise unusable(f"{key}[{min(alone)}]", "expected beads that touch: this bead is not connected to the first")
 
 
-def automatic_spacing(file: CaseFile, drive: Excitation, drafts: Mapping[str, WalkerDraft]) -> float:
-    """Spacing at which walkers of a case do not meet, m."""
+def automatic_spacing(
+    file: CaseFile,
+    drive: Excitation,
+    drafts: Mapping[str, WalkerDraft],
+) -> float:
+    """Spacing at which walkers of a case do not meet during its run, m."""
     loose = file.mixture is not None or bool(file.placed)
     _, cycles_per_sample = samples_of(file.run, drive, loose=loose)
     duration = cycles_of(file.run, drive, cycles_per_sample) / drive.frequency
@@ -209,17 +221,18 @@ def automatic_spacing(file: CaseFile, drive: Excitation, drafts: Mapping[str, Wa
 
 def check_walkers_at_rest(case: Case, file: CaseFile, notes: Notes) -> None:
     """Refuse starts in which beads overlap, and note spacings that the file does not give."""
-    tables = {"dimers": file.dimers, **{f"clusters[{number}]": table for number, table in enumerate(file.clusters)}}
+    given = {"dimers": None if file.dimers is None else file.dimers.spacing}
+    for number, cluster in enumerate(file.clusters):
+        given[f"clusters[{number}]"] = cluster.spacing
     for key, walkers in case.walkers_by_key.items():
         _check_held(case, walkers)
         overlap = max(load.overlap for load in contact_loads(case, walkers))
         if overlap * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
             message = "expected a larger one: at rest the beads overlap by more than 2 % of the smallest radius"
             raise unusable("contact.youngs_modulus", message)
-        table = tables[key]
-        if table is None or table.spacing is None:
-            why = "so that walkers do not touch at the start" if walkers.meet else "so that walkers do not meet"
-            notes.add(f"{key}.spacing", why)
+        if given[key] is None:
+            avoided = "touch at the start" if walkers.meet else "meet"
+            notes.add(f"{key}.spacing", f"so that walkers do not {avoided}")
             continue
         # Beads of different walkers may touch, but not overlap, if they are meant to meet.
         least = (1.0 if walkers.meet else 1.5) * walkers.length

@@ -53,9 +53,13 @@ def drive_of(table: DriveTable, boundary: Boundary, dimer: Dimer | None, notes: 
 
 
 def _axis_and_peak(
-    sine: DriveTable | HarmonicTable, key: str, boundary: Boundary, dimer: Dimer | None, notes: Notes
+    sine: DriveTable | HarmonicTable,
+    key: str,
+    boundary: Boundary,
+    dimer: Dimer | None,
+    notes: Notes,
 ) -> dict[str, Any]:
-    """Values of the keys ``axis`` and ``peak_acceleration`` (m/s²) of a sine, whose table has the dotted ``key``."""
+    """Values of ``axis`` and ``peak_acceleration`` (m/s²) of the table at a dotted key."""
     axis, peak = sine.axis, sine.peak_acceleration
     if axis is None:
         axis = "z" if boundary.closed else "x"
@@ -69,7 +73,7 @@ def _axis_and_peak(
 
 
 def _check_harmonics(drive: Drive) -> None:
-    """Refuse harmonics without a common period, and those that walls in the frame ``lab`` cannot follow."""
+    """Refuse harmonics without a common period, and those that walls cannot follow."""
     excitation = drive.excitation
     try:
         common_frequency([harmonic.frequency for harmonic in excitation.harmonics])

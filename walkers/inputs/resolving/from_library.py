@@ -1,4 +1,4 @@
-"""Values of the library and defaults, which fill in the document of a case before it is validated."""
+"""Values of the library and defaults, filled in before the document of a case is validated."""
 
 from __future__ import annotations
 

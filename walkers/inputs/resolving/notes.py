@@ -14,5 +14,5 @@ class Notes:
         self.sources = dict(sources)
 
     def add(self, name: str, why: str, origin: Whence = "derived", text: str = "") -> None:
-        """Note why a key has its value; ``text`` is the value in words, if its number does not say it."""
+        """Note why a key has its value; ``text`` is the value in words."""
         self.sources[name] = Source(origin, why, text)

@@ -1,4 +1,4 @@
-"""A vessel of the user's own, of a mesh or of planes: its walls, its extent, and whether beads fit into it."""
+"""A vessel of the user's own, of a mesh or of planes: its walls, its extent, and its size in beads."""
 
 from __future__ import annotations
 
@@ -20,8 +20,13 @@ from walkers.inputs.tables.shapes.walls import BOTTOM
 _WIDEST = 1000.0  # largest width of a vessel in diameters of the largest bead
 
 
-def with_vessel(boundary: Boundary, document: Mapping[str, Any], largest: float, notes: Notes) -> Boundary:
-    """The boundary with the walls and the extent of a vessel of the user's own; other boundaries are as they were.
+def with_vessel(
+    boundary: Boundary,
+    document: Mapping[str, Any],
+    largest: float,
+    notes: Notes,
+) -> Boundary:
+    """Complete a vessel of the user's own by its walls and its extent.
 
     Parameters
     ----------
@@ -37,7 +42,8 @@ def with_vessel(boundary: Boundary, document: Mapping[str, Any], largest: float,
     Returns
     -------
     Boundary
-        With planes, or with points and triangles if planes cannot describe the vessel.
+        With planes, or with points and triangles if planes cannot describe the vessel. A boundary
+        of another shape is the same.
 
     Raises
     ------

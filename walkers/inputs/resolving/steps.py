@@ -1,8 +1,9 @@
 """Values that follow from others: a case of the tables of its file, in the order of the physics.
 
-`resolve` takes a `CaseFile`, whose values may be missing, completes the tables of its bodies, drive, liquid and
-contacts to a `Setup`, and adds the run, which makes it a `Case`. What the library gives is in the tables before
-(`walkers.inputs.resolving.from_library`). Each step notes where its values are from. Checks of the bodies come last.
+`resolve` takes a `CaseFile`, whose values may be missing, completes the tables of its bodies, drive,
+liquid and contacts to a `Setup`, and adds the run, which makes it a `Case`. What the library gives is
+in the tables before (`walkers.inputs.resolving.from_library`). Each step notes where its values are
+from. Checks of the bodies come last.
 """
 
 from __future__ import annotations
@@ -110,15 +111,16 @@ def _setup(file: CaseFile, document: Mapping[str, Any], notes: Notes) -> Setup:
     drive = drive_of(file.drive, boundary, _dimer(file, drafts), notes)
     spacing = automatic_spacing(file, drive.excitation, drafts)
     walkers = {key: walkers_of(draft, facings[key], spacing) for key, draft in drafts.items()}
-    contact = file.contact.completed(Contact, {"youngs_modulus": file.contact.youngs_modulus or _SOFTEST})
+    modulus = file.contact.youngs_modulus or _SOFTEST
+    contact = file.contact.completed(Contact, {"youngs_modulus": modulus})
     bodies = {
         "dimers": walkers.pop("dimers", None),
         "clusters": tuple(walkers.values()),
         "mixture": mixture,
         "placed": placed,
     }
-    others = {"boundary": boundary, "drive": drive, "liquid": liquid, "contact": contact}
-    return file.completed(Setup, {**bodies, **others})
+    surroundings = {"boundary": boundary, "drive": drive, "liquid": liquid, "contact": contact}
+    return file.completed(Setup, {**bodies, **surroundings})
 
 
 def _dimer(file: CaseFile, drafts: Mapping[str, WalkerDraft]) -> Dimer | None:
@@ -180,11 +182,12 @@ def _check_law(case: Setup) -> None:
 def _hardened(softened: Setup, notes: Notes) -> Setup:
     """The case with the Young's modulus of ``"auto"``, given with the lowest one.
 
-    It is the lowest at which bridges delay contacts little (`LARGEST_DELAY`). In a mixture a higher modulus must not
-    shorten the time step: hard beads would cost several times as much.
+    It is the lowest at which bridges delay contacts little (`LARGEST_DELAY`). In a mixture a higher
+    modulus must not shorten the time step: hard beads would cost several times as much.
     """
     while delay_of(softened) > LARGEST_DELAY and softened.contact.youngs_modulus < _HARDEST:
-        harder = softened.put("contact.youngs_modulus", 4.0 * softened.contact.youngs_modulus)
+        modulus = 4.0 * softened.contact.youngs_modulus
+        harder = softened.but(contact=softened.contact.but(youngs_modulus=modulus))
         if softened.mixture is not None and _longest_step(harder) < _longest_step(softened):
             break
         softened = harder

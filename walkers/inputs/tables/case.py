@@ -1,7 +1,8 @@
-"""A case: what its file says (`CaseFile`), what forces depend on (`Setup`), and the whole of it (`Case`).
+"""A case: what its file says (`CaseFile`), what forces depend on (`Setup`), and all of it (`Case`).
 
-All are in SI units; their fields are the keys of a file. `walkers.inputs.case_building` makes a `Case` of a file. A
-deck is rendered from it, a run directory stores it as ``case.json``, and the hash in a run's name is made of it.
+All are in SI units; their fields are the keys of a file. `walkers.inputs.case_building` makes a `Case`
+of a file. A deck is rendered from it, a run directory stores it as ``case.json``, and the hash in a
+run's name is made of it.
 """
 
 from __future__ import annotations
