@@ -132,10 +132,8 @@ public:
   }
 
 private:
-  enum {
-    GROW,
-    RESTART
-  };  // callbacks of the engine, when arrays grow and when a restart file is read
+  // Callbacks of the engine: when its arrays grow, and when a restart file is read.
+  enum { GROW, RESTART };
   enum { COLUMNS = 12 };  // nearest point and centre: x, y, z; wall, bead; force: x, y, z; overlap
 
   struct NearWall {
