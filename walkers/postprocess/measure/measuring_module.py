@@ -60,7 +60,7 @@ class MeasuringModule(Protocol):
         Returns
         -------
         mapping of str to number
-            Numbers in SI units by their names in `GROUPS`; empty if there are none.
+            Numbers in SI units by their names in the group ``NAME``; empty if there are none.
         """
 
     def measure(self, motion: Motion) -> Measured:
