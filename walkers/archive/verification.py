@@ -142,21 +142,48 @@ def _checksum_in(archive: zipfile.ZipFile, name: str) -> str | None:
 
 def _compared(folder: Path, listed: Mapping[str, str], left_out: Collection[str] = ()) -> Verification:
     """Compare the files of a folder with their listed checksums, by relative path."""
-    paths = (path for path in folder.rglob("*") if path.is_symlink() or not path.is_dir() or not any(path.iterdir()))
-    paths_by_name = {path.relative_to(folder).as_posix(): path for path in sorted(paths)}
-    sums = checksums(folder, [name for name, path in paths_by_name.items() if name in listed and path.is_file()])
+    files = _files_in(folder)
+    readable = [name for name, path in files.items() if name in listed and path.is_file()]
+    sums = checksums(folder, readable)
     changed = [name for name, checksum in sums.items() if checksum != listed[name]]
-    unlisted = [name for name in paths_by_name if name not in listed and name not in (MANIFEST_NAME, SUMS_NAME)]
-    # Everything in the folder of segments is read as a part of the run.
-    doubted = [name for name in unlisted if SEGMENTS in Path(name).parts or name.endswith(_READ)]
-    folders = {"", *(name.rpartition("/")[0] for name in listed)}
-    since = (name for name in unlisted if name not in doubted)
-    parents = ((name, name.rpartition("/")[0]) for name in since)
+    doubted, new = [], []
+    for name in files:
+        if name in listed or name in (MANIFEST_NAME, SUMS_NAME):
+            continue
+        if _may_be_read(name):
+            doubted.append(name)
+        else:
+            new.append(name)
     findings = {
         "changed": changed,
         "missing": [name for name in listed if name not in sums and name not in left_out],
         "not listed": doubted,
-        "made since": list(dict.fromkeys(name if parent in folders else f"{parent}/" for name, parent in parents)),
+        "made since": _with_new_folders(new, listed),
         "left out": [name for name in left_out if name not in sums],
     }
     return Verification(folder.resolve().name, f"{len(sums) - len(changed)} files are unchanged", findings)
+
+
+def _files_in(folder: Path) -> dict[str, Path]:
+    """Files, links and empty folders below a folder, by their relative paths in order."""
+    files = {}
+    for path in sorted(folder.rglob("*")):
+        is_folder = path.is_dir() and not path.is_symlink()
+        if not is_folder or not any(path.iterdir()):
+            files[path.relative_to(folder).as_posix()] = path
+    return files
+
+
+def _may_be_read(name: str) -> bool:
+    """Whether a file that is not listed could be read as a part of a run, as all in the folder of segments."""
+    return SEGMENTS in Path(name).parts or name.endswith(_READ)
+
+
+def _with_new_folders(names: Sequence[str], listed: Collection[str]) -> list[str]:
+    """Names of files; a folder without listed files stands for all files in it."""
+    listed_folders = {"", *(name.rpartition("/")[0] for name in listed)}
+    shown = []
+    for name in names:
+        parent = name.rpartition("/")[0]
+        shown.append(name if parent in listed_folders else f"{parent}/")
+    return list(dict.fromkeys(shown))
