@@ -148,7 +148,7 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
     write_json(folder / on_disk.CASE_NAME, case.as_dict(), at_once=False)
     write_json(folder / decks.LAYOUT_NAME, rendered.layout.as_dict(), at_once=False)
-    on_disk.write_segment_record(folder, segment, report, by_hand=notes)
+    on_disk.write_segment_record(folder, segment, report, by_hand=notes, deck_edited=bool(edits))
     # Cycles that were enough for the finished run of a case may be too few for an edited deck.
     planned = before.run
     doubtful = case.run.cycles < planned.cycles if planned.until_steady else case.apart and case != before
@@ -156,7 +156,7 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
         reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
         more = f"{planned.cycles}, as walkers run does," if planned.until_steady else "more"
         notes.append(f"{reached}; set cycles to {more} and run again")
-        on_disk.write_segment_record(folder, segment, report, by_hand=notes)
+        on_disk.write_segment_record(folder, segment, report, by_hand=notes, deck_edited=bool(edits))
     measure(folder)
     about: dict[str, Any] = {"drive_from": rest, "segments": 1, "by_hand": notes}
     scaled = folder / decks.SCALED_BRIDGES_NAME

@@ -62,7 +62,8 @@ class Results(dict[str, Any]):
         Reasons to doubt the numbers.
     about
         ``case``, ``drive``, ``rests_on`` (`walkers.postprocess.measure.uncertainty.rests_on`),
-        ``by_hand`` (notes on a deck that was run by hand), ``tables`` (their names).
+        ``by_hand`` (notes on a deck that was run by hand), ``deck_edited`` (whether its parameters or
+        commands are not those of the program), ``tables`` (their names).
     """
 
     def __init__(
@@ -112,7 +113,8 @@ def measure(directory: Path) -> None:
     numbers = derived(case) | {"goes_uphill": case.goes_uphill, "truncated": motion.truncated}
     for part in parts:
         numbers |= part.numbers
-    notes = read_json(segment_directories(directory)[-1] / SEGMENT_NAME).get("by_hand") or []
+    segment = read_json(segment_directories(directory)[-1] / SEGMENT_NAME)
+    notes = segment.get("by_hand") or []
     warnings = [*notes, *(warning for part in parts for warning in part.warnings)]
     if names := limits_of(case).exceeded_by(case.run.time_step):
         warnings.append(f"the time step is beyond a limit of stability ({', '.join(names)}): the results are wrong")
@@ -128,6 +130,7 @@ def measure(directory: Path) -> None:
         "drive": conditions(case),
         "rests_on": rests_on(case.origins),
         "by_hand": notes,
+        "deck_edited": segment.get("deck_edited", False),
         "tables": list(tables),
         "numbers": plain(numbers),
         "warnings": warnings,
@@ -196,6 +199,7 @@ def recorded(directory: Path) -> dict[str, Any]:
         raise refused(directory, f"has no {RESULT_NAME}; {again}") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise refused(directory, f"its {RESULT_NAME} cannot be read ({error}); {again}") from error
+    contents.setdefault("deck_edited", False)  # earlier results lack it
     try:
         outdated = version != VERSION or _is_outdated(directory, versions)
     except (OSError, ValueError) as error:
