@@ -20,6 +20,7 @@ import pytest
 from tests.conftest import PROGRAM, SHORT, call, document, make_case, to_toml
 from walkers import Run, run
 from walkers.arrays import FloatArray, Vector
+from walkers.inputs.bridge_laws import by_name
 from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.tables.case import Case
@@ -27,7 +28,6 @@ from walkers.inputs.tables.shapes.walls import BOTTOM, Flat, Round, Wall
 from walkers.inputs.toml import read_toml
 from walkers.physics.bridge import Surfaces
 from walkers.physics.contact import hertz_overlap, reduced_modulus
-from walkers.physics.laws import by_name
 from walkers.postprocess.measure.dump import local_frames
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.runner import audit, model_sources

@@ -19,6 +19,7 @@ from tests.conftest import call, make_case
 from tests.test_bad_input import LAW
 from walkers import run as run_case
 from walkers.arrays import FloatArray
+from walkers.inputs.bridge_laws import by_name
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.loads import bridge_at_rest, delay
@@ -28,11 +29,11 @@ from walkers.physics.bridge import Surfaces
 from walkers.physics.capillary import BridgeLiquid, largest_normal, share_of_bead
 from walkers.physics.capillary import rupture_distance as rupture_of_lian
 from walkers.physics.laplace import force_curve, rupture_distance
-from walkers.physics.laws import LAWS, by_name, rabinovich, willett, young_laplace
+from walkers.physics.laws import LAWS, rabinovich, willett, young_laplace
 from walkers.physics.time_step import FRACTIONS
 from walkers.runs.preview import summarise
 
-pytestmark = pytest.mark.filterwarnings("ignore::walkers.physics.laws.ExecutedLawWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::walkers.inputs.bridge_laws.ExecutedLawWarning")
 
 
 def surfaces(

@@ -15,12 +15,13 @@ import pytest
 from tests.conftest import brief_pile, call, document, make_case, to_toml
 from tests.test_physics import OWN
 from walkers import run as run_case
+from walkers.inputs.bridge_laws import by_name
 from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.boundary import Boundary
 from walkers.physics.bridge import Surfaces
-from walkers.physics.laws import LAWS, by_name
+from walkers.physics.laws import LAWS
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.templates.bridge_tables import TOLERANCE, RecordedLaw, tabulated

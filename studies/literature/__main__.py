@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -23,8 +24,10 @@ def literature(*only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAUL
         benchmarks, bridges, crosscheck or experiments; default: all.
     """
     from studies.literature.checks import LITERATURE
+    from walkers.inputs.bridge_laws import ExecutedLawWarning
     from walkers.second_engine.lines import as_dict, as_text, failures, run_checks
 
+    warnings.simplefilter("ignore", ExecutedLawWarning)  # the experiments have bridge laws of their own
     lines = run_checks(LITERATURE, out, only, tell)
     print_as(as_json, lambda: as_dict(lines), lambda: as_text(lines))
     return 1 if failures(lines) else 0

@@ -27,9 +27,10 @@ from typing import Any
 
 from walkers.errors import refused
 from walkers.files import fsync_path, link_or_copy, open_regular, read_json, write_bytes, write_json
+from walkers.inputs.bridge_laws import source_of, source_sha256
 from walkers.inputs.case_building import stored_case
 from walkers.inputs.tables.case import Case
-from walkers.physics.laws import LAWS, source_of, source_sha256
+from walkers.physics.laws import LAWS
 from walkers.runner.binary import Engine
 from walkers.runner.failures import DiskFull, FileTooLarge, OutputGone, RunBusy
 from walkers.runner.launch import EngineReport

@@ -17,11 +17,11 @@ from typing import Any
 
 from walkers.errors import refused
 from walkers.files import checksum, read_json, write_json
+from walkers.inputs.bridge_laws import source_of
 from walkers.inputs.case_building import build_case, stored_case
 from walkers.inputs.config_table import changed
 from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.tables.run import CONSTANT, settling_of
-from walkers.physics.laws import source_of
 from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.results import measure
 from walkers.rounding import percent

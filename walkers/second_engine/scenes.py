@@ -21,13 +21,14 @@ import numpy as np
 
 from walkers.arrays import FloatArray, Vector
 from walkers.errors import Stopped
+from walkers.inputs.bridge_laws import by_name
 from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import surfaces_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import BOTTOM, Flat, Round, Wall
 from walkers.physics.bridge import Curve, Forces, Surfaces
-from walkers.physics.laws import LAWS, by_name
+from walkers.physics.laws import LAWS
 from walkers.postprocess.measure.dump import BinaryDump
 from walkers.postprocess.measure.motion import prescribed_motion
 from walkers.runner.binary import Engine

@@ -16,8 +16,8 @@ from math import inf, log2
 import numpy as np
 
 from walkers.arrays import FloatArray
+from walkers.inputs.bridge_laws import by_name
 from walkers.physics.bridge import BridgeLaw, Curve, Forces, Surfaces, UnusableLawError, columns_at
-from walkers.physics.laws import by_name
 from walkers.templates.placement import Surface
 
 TOLERANCE = 1e-6

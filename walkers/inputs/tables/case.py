@@ -19,6 +19,7 @@ from pydantic import BeforeValidator, Field
 from walkers.arrays import Vector
 from walkers.errors import Problem
 from walkers.inputs import units
+from walkers.inputs.bridge_laws import by_name
 from walkers.inputs.config_table import SAME_RUN, Derived, Table, key
 from walkers.inputs.keys import MISSING, flatten, is_axis, parts_of, value_at
 from walkers.inputs.origins import Origin, Source, text_of
@@ -40,7 +41,6 @@ from walkers.inputs.tables.materials import Beads, Contact, ContactTable, Enviro
 from walkers.inputs.tables.run import Run, RunTable, settling_of
 from walkers.inputs.units import kind_in
 from walkers.physics.bridge import BridgeLaw
-from walkers.physics.laws import by_name
 
 
 def _ranges(value: object) -> object:
