@@ -1,4 +1,4 @@
-"""Words: identifiers say what they name, and the glossary of CONTRIBUTING.md is short and of use."""
+"""Words: identifiers say what they name, and the pages use the words of the glossary in CONTRIBUTING.md."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ EMPTY = {
     *("wanted", "way", "ways", "what", "whence"),
 }
 """Words that name nothing."""
-MOST_WORDS = 40  # of the glossary
 
 
 def names_in(tree: ast.AST) -> Iterator[tuple[str | None, int]]:
@@ -33,16 +32,16 @@ def names_in(tree: ast.AST) -> Iterator[tuple[str | None, int]]:
 
 @pytest.mark.parametrize("folder", ["walkers", "studies", "docs"])
 def test_identifiers_say_what_they_name(folder: str) -> None:
-    files = [file for file in sorted((ROOT / folder).rglob("*.py")) if not {"gallery", "runs"} & {*file.parts}]
+    files = [file for file in sorted((ROOT / folder).rglob("*.py")) if "gallery" not in file.parts]
     names = [(file, name, line) for file in files for name, line in names_in(ast.parse(file.read_text("utf-8")))]
     assert len(names) > 100
     empty = [f"{file}:{line} {name}" for file, name, line in names if name and name.strip("_") in EMPTY]
     assert not empty
 
 
-def test_the_glossary_is_short_and_pages_use_its_words() -> None:
+def test_pages_use_the_words_of_the_glossary() -> None:
     _, _, glossary = (ROOT / "CONTRIBUTING.md").read_text("utf-8").partition("## Glossary")
     words = [word for row in re.findall(r"(?m)^\| ([^|]+) \|", glossary)[1:] for word in row.split(", ")]
     text = "\n".join(page.read_text("utf-8") for page in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
-    assert 20 < len(words) == len(set(words)) <= MOST_WORDS
+    assert 20 < len(words) == len(set(words))
     assert [word for word in words if not re.search(rf"\b{word}", text, re.IGNORECASE)] == []
