@@ -38,7 +38,7 @@ from walkers.runner.directory import case_of, locked
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.runs.case_text import readable
 from walkers.runs.comparison import Side, compare_runs
-from walkers.sweeps.folder import bytes_text, weigh
+from walkers.sweeps.listing import bytes_text, weigh
 from walkers.sweeps.record import read_record
 from walkers.sweeps.scheduler import Options, plan_sweep
 

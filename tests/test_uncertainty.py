@@ -34,7 +34,7 @@ from walkers.postprocess.measure.walking import _velocities
 from walkers.rounding import rounded
 from walkers.runs.case_text import kind_of
 from walkers.sweeps.accuracy import measure_accuracy, times_of
-from walkers.sweeps.folder import as_text, inventory
+from walkers.sweeps.listing import as_text, inventory
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.table import default_column
 from walkers.theory.prediction import describe, predict

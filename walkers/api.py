@@ -46,7 +46,7 @@ from walkers.sweeps.accuracy import measure_accuracy
 from walkers.sweeps.climbing import conditions_in, summarise_climbs, write_climbs
 from walkers.sweeps.figure import column_of, figure_of
 from walkers.sweeps.figure_options import FigureOptions
-from walkers.sweeps.folder import run_text
+from walkers.sweeps.listing import run_text
 from walkers.sweeps.record import read_record
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import Failure, Options, run_sweep

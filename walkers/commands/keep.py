@@ -16,7 +16,7 @@ from walkers.errors import apply_all
 from walkers.runner.directory import UNFINISHED
 from walkers.runs.by_hand import as_run, write_folder
 from walkers.runs.names import find
-from walkers.sweeps import folder
+from walkers.sweeps import listing
 from walkers.templates.deck import RUN_NAME, render_deck, whole
 
 _REMOVED = "Runs, with their spreads and accuracies, and sweeps, with the runs that no other sweep has."
@@ -100,7 +100,7 @@ def clean(
             return directory_of(name, out)
         return Path(name) if Path(name).is_dir() else out / name
 
-    plan = folder.plan_cleaning(out, apply_all(place_of, runs))
+    plan = listing.plan_cleaning(out, apply_all(place_of, runs))
     print(plan.as_text())
     if plan.is_empty:
         return 0
@@ -109,7 +109,7 @@ def clean(
         if not _is_confirmed("remove them?"):
             print("nothing removed")
             return 0
-    left = folder.clean(plan)
+    left = listing.clean(plan)
     tell(*(f"{directory}: {why}" for directory, why in left.items()))
     return 1 if left else 0
 

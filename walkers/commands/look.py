@@ -37,19 +37,19 @@ def list_(
     to
         Write the table of the sweep, with units, to this file (.csv, .parquet, .json).
     """
-    from walkers.sweeps import folder
+    from walkers.sweeps import listing
 
     if sweep is not None:
         refuse_any({"where": where, "all": every}, "is for folders, not for a sweep")
         _list_points(sweep, out, to, as_json)
         return
     refuse("--to", to is not None, "expected a sweep, whose table is written")
-    contents = folder.inventory(out)
-    shown = contents if every else folder.without_members(contents)
+    contents = listing.inventory(out)
+    shown = contents if every else listing.without_members(contents)
     hidden = len(contents) - len(shown)
     if where:
-        shown, hidden = folder.select(contents, where), 0
-    print_as(as_json, lambda: folder.as_json(shown), lambda: folder.as_text(shown, hidden))
+        shown, hidden = listing.select(contents, where), 0
+    print_as(as_json, lambda: listing.as_json(shown), lambda: listing.as_text(shown, hidden))
 
 
 def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
