@@ -38,8 +38,10 @@ from walkers.runner.directory import case_of, locked
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.runs.case_text import readable
 from walkers.runs.comparison import Side, compare_runs
-from walkers.sweeps.listing import bytes_text, weigh
+from walkers.runs.listing import bytes_text, weigh
+from walkers.runs.removal import remove
 from walkers.sweeps.record import read_record
+from walkers.sweeps.removal import named_in
 from walkers.sweeps.scheduler import Options, plan_sweep
 
 
@@ -164,8 +166,8 @@ def test_clean_removes_leftovers_alone(out: Path) -> None:
     shutil.copy(next(iter(before.values())) / "case.json", thesis)
     with locked([out / held.name.removesuffix(".incomplete")]):
         refused = call("clean")  # where there is no terminal
-        words = ("1 failed run", "1 interrupted run", "1 stale lock", "stays: 1 running")
-        assert all(word in refused.stdout for word in words)
+        total = refused.stdout.splitlines()[-1].partition(" to remove")[0]
+        assert {*total.split(", ")} == {"1 failed run", "1 interrupted run", "1 stale lock"}
         assert (refused.returncode, "no terminal" in refused.stderr, failed.exists()) == (2, True, True)
         call("clean", "--yes", check=True)
     assert not any(path.exists() for path in (failed, interrupted, stale))
@@ -186,10 +188,48 @@ def test_clean_keeps_runs_that_other_sweeps_have(out: Path) -> None:
     (out / "beads").rename(out / f"{one}-accuracy")
     shutil.copytree(out / "three", out / f"{one}-spread")
     shown = call("clean", str(finished_places(out)[one]), "--yes", check=True).stdout
-    assert "needed by the sweep three, which would run them again: 1" in shown
+    assert re.search(rf"(?m)^{one} +finished run .*  needed by the sweep three, which would run it again$", shown)
     assert before.keys() - finished_places(out).keys() == (runs["beads"] - runs["three"]) | {one}
     assert not [*out.glob(f"{one}-*")]
     assert walkers.load(out / "three").table()["status"].tolist().count("missing") == 1
+
+
+def test_clean_takes_no_named_run_that_a_process_computes(out: Path) -> None:
+    """Nor the sweep that alone has it, nor any other run that is named beside it."""
+    places = finished_places(out)
+    runs = {name: {Path(run).name for run in walkers.load(out / name).table()["run"]} for name in ("beads", "three")}
+    busy, other = sorted(runs["beads"] - runs["three"])[:2]
+    shutil.rmtree(places[busy])
+    with locked([out / busy]):
+        for names in ((busy,), ("beads",), (other, busy)):
+            ended = call("clean", *names, "--yes")
+            message = f"walkers: {busy}: expected a run that is not in progress\n"
+            assert (ended.returncode, ended.stderr) == (2, message)
+    assert finished_places(out).keys() == places.keys() - {busy}
+    assert (out / "beads" / "sweep.json").is_file()
+
+
+def test_clean_holds_the_lock_and_takes_the_manifest_first(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A removal that ends in between leaves no finished run, and a run that was locked after the question stays."""
+    first, second = list(finished_places(out).values())[:2]
+    removals = named_in(out, [first, second])
+    with locked([second]):
+        with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
+            patched.setattr("walkers.runs.removal.shutil.rmtree", _interrupted)
+            remove(removals[:1])
+        assert (first / "case.json").is_file() and not (first / MANIFEST_NAME).exists()
+        (kept,) = remove(removals[1:]).items()
+        assert kept == (second, "kept: a process is computing it")
+    assert (second / MANIFEST_NAME).is_file()
+    assert remove(removals) == {}
+    assert not first.exists() and not second.exists()
+
+
+def _interrupted(directory: Path) -> None:
+    """As a removal that is interrupted at its start; the lock of the run is held."""
+    place = directory.with_name(f"{directory.name}.lock")
+    assert place.is_file()
+    raise KeyboardInterrupt
 
 
 def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:

@@ -38,6 +38,7 @@ from walkers.runner.binary import find_engine
 from walkers.runner.failures import RunBusy
 from walkers.runs.by_hand import as_run, take_in
 from walkers.runs.comparison import Comparison, Side, compare_runs
+from walkers.runs.listing import run_text
 from walkers.runs.making import make_runs, progress_at
 from walkers.runs.names import Changes, Given, Reference, find, is_begun, not_a_run, readable_case, refusing
 from walkers.runs.status import state_at, worst_status
@@ -46,7 +47,6 @@ from walkers.sweeps.accuracy import measure_accuracy
 from walkers.sweeps.climbing import conditions_in, summarise_climbs, write_climbs
 from walkers.sweeps.figure import column_of, figure_of
 from walkers.sweeps.figure_options import FigureOptions
-from walkers.sweeps.listing import run_text
 from walkers.sweeps.record import read_record
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import Failure, Options, run_sweep

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +18,8 @@ from walkers.errors import apply_all
 from walkers.runner.directory import UNFINISHED
 from walkers.runs.by_hand import as_run, write_folder
 from walkers.runs.names import find
-from walkers.sweeps import listing
+from walkers.runs.removal import Removal, describe, remove, unfinished_in
+from walkers.sweeps.removal import named_in
 from walkers.templates.deck import RUN_NAME, render_deck, whole
 
 _REMOVED = "Runs, with their spreads and accuracies, and sweeps, with the runs that no other sweep has."
@@ -94,24 +97,32 @@ def clean(
     yes
         Do not ask for confirmation.
     """
-
-    def place_of(name: str) -> Path:
-        if Path(name).suffix != UNFINISHED:
-            return directory_of(name, out)
-        return Path(name) if Path(name).is_dir() else out / name
-
-    plan = listing.plan_cleaning(out, apply_all(place_of, runs))
-    print(plan.as_text())
-    if plan.is_empty:
+    removals = _removals(runs, out)
+    print(describe(removals))
+    if not removals:
         return 0
     if not yes:
         refuse("--yes", not sys.stdin.isatty(), "expected, because there is no terminal to ask for confirmation")
         if not _is_confirmed("remove them?"):
             print("nothing removed")
             return 0
-    left = listing.clean(plan)
-    tell(*(f"{directory}: {why}" for directory, why in left.items()))
+    left = remove(removals)
+    tell(*(f"{path}: {reason}" for path, reason in left.items()))
     return 1 if left else 0
+
+
+def _removals(names: Sequence[str], out: Path) -> list[Removal]:
+    if not names:
+        return unfinished_in(out)
+    return named_in(out, apply_all(partial(_place_of, out=out), names))
+
+
+def _place_of(name: str, out: Path) -> Path:
+    """The directory of a named run or sweep; the name may be that of the directory of an unfinished run."""
+    path = Path(name)
+    if path.suffix != UNFINISHED:
+        return directory_of(name, out)
+    return path if path.is_dir() else out / name
 
 
 def _is_confirmed(question: str) -> bool:

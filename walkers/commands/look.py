@@ -37,6 +37,7 @@ def list_(
     to
         Write the table of the sweep, with units, to this file (.csv, .parquet, .json).
     """
+    from walkers.runs.listing import select
     from walkers.sweeps import listing
 
     if sweep is not None:
@@ -48,7 +49,8 @@ def list_(
     shown = contents if every else listing.without_members(contents)
     hidden = len(contents) - len(shown)
     if where:
-        shown, hidden = listing.select(contents, where), 0
+        shown = select([entry for entry in contents if entry.kind == "run"], where)
+        hidden = 0
     print_as(as_json, lambda: listing.as_json(shown), lambda: listing.as_text(shown, hidden))
 
 

@@ -1,0 +1,320 @@
+"""The runs in a folder with their status, and as text.
+
+Listing opens no dumps and no tables, and does without pandas: a folder of ten thousand runs takes seconds. Sweeps are
+listed by `walkers.sweeps.listing`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from stat import S_ISDIR
+from typing import Any
+
+from walkers.errors import InputError, refused, suggestion
+from walkers.files import read_json
+from walkers.inputs.case_building import stored_case
+from walkers.inputs.tables.case import Case
+from walkers.postprocess.measure.numbers import headline, in_short
+from walkers.postprocess.measure.results import Results, plain, read
+from walkers.rounding import duration_text
+from walkers.runner import directory as on_disk
+from walkers.runner.manifest import MANIFEST_NAME
+from walkers.runs.case_text import (
+    FlatCase,
+    differing,
+    flattened,
+    has_value,
+    readable,
+    short_keys,
+)
+from walkers.runs.making import progress_at
+from walkers.runs.status import state_at
+from walkers.text import aligned
+
+_SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """A run or a sweep in a folder of runs.
+
+    Attributes
+    ----------
+    kind
+        ``run`` or ``sweep``.
+    name
+        Name of the directory without the ending of unfinished runs, such as ``fig1b-5f7d8c66baa0``.
+    case
+        Name of the case; of a sweep, of its base case.
+    status
+        finished, running, failed, or interrupted: a run can be continued, or points are missing.
+    directory
+        Where the files are now.
+    age
+        Time since the end of the run, or since the last change of an unfinished one, s.
+    size
+        Size of the files in bytes; of a sweep, of its runs.
+    reason, message
+        Why a run failed, how far it is, or a remark on a finished run; None if there is none.
+    velocity
+        Main velocity of walkers, m/s; None if there is none.
+    result
+        The main numbers as text.
+    numbers
+        All numbers of the result, SI units; None for unfinished runs and sweeps.
+    points
+        Numbers of points of a sweep by status.
+    runs
+        Names of the runs of a sweep.
+    parameters
+        Values of the case (`flattened`); of a sweep, the number of values of each varied key.
+    """
+
+    kind: str
+    name: str
+    case: str
+    status: str
+    directory: Path
+    age: float = 0.0
+    size: int = 0
+    reason: str | None = None
+    message: str | None = None
+    velocity: float | None = None
+    result: str = "-"
+    numbers: Mapping[str, Any] | None = None
+    points: Mapping[str, int] | None = None
+    runs: Sequence[str] | None = None
+    parameters: FlatCase = field(default_factory=FlatCase)
+
+    @property
+    def weight(self) -> list[str]:
+        """Age and size as text."""
+        return [duration_text(self.age), bytes_text(self.size)]
+
+
+def runs_in(out: Path) -> list[Entry]:
+    """The runs in a folder, finished or not, sorted by name.
+
+    Raises
+    ------
+    InputError
+        If the path is a file. A folder that does not exist has no runs.
+    """
+    runs = []
+    for path in folders_in(out):
+        run = entry_of(path)
+        if run is not None:
+            runs.append(run)
+    runs += _without_directory(out, {place_of(run.directory) for run in runs})
+    return sorted(runs, key=lambda run: (run.name, run.status != "finished"))
+
+
+def folders_in(out: Path) -> list[Path]:
+    """The folders in a folder of runs, sorted; `InputError` if it is a file."""
+    if not out.exists():
+        return []
+    if not out.is_dir():
+        raise refused(out, "expected a folder of runs, this is a file")
+    return sorted(path for path in out.iterdir() if path.is_dir())
+
+
+def place_of(directory: Path) -> Path:
+    """The final directory of a run, beside which its lock is."""
+    name = directory.name.removesuffix(on_disk.UNFINISHED).removesuffix(on_disk.REPLACED)
+    return directory.with_name(name)
+
+
+def _without_directory(out: Path, listed: set[Path]) -> list[Entry]:
+    """Runs in progress that have a lock alone: in a shared deck, or just before their directory is made."""
+    runs = []
+    for lock in out.glob("*.lock"):
+        place = lock.with_suffix("")
+        if place not in listed and on_disk.is_locked(place):
+            case = place.name.rpartition("-")[0]
+            runs.append(Entry(kind="run", name=place.name, case=case, status="running", directory=place))
+    return runs
+
+
+def entry_of(path: Path) -> Entry | None:
+    """The run in a directory; None if the directory is a user's own."""
+    place = place_of(path)
+    finished = place == path and on_disk.is_finished(path)
+    is_run_name = on_disk.is_run_name(place.name)
+    if not finished and not is_run_name:
+        return None
+    case = _case_in(path)
+    if case is None:
+        holds_run = finished or (place != path and on_disk.holds_unfinished(path))
+        if not is_run_name or not holds_run:
+            return None
+    case_name = case.name if case else place.name.rpartition("-")[0]
+    parameters = flattened(case) if case else FlatCase()
+    if finished:
+        return _finished(path, case_name, parameters)
+    return _unfinished(path, case_name, parameters)
+
+
+def _case_in(path: Path) -> Case | None:
+    try:
+        return stored_case(read_json(path / on_disk.CASE_NAME))
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _finished(path: Path, case: str, parameters: FlatCase) -> Entry:
+    size, _ = weigh(path)
+    numbers, velocity, text, reason = None, None, "-", None
+    try:
+        results = read(path)
+    except InputError as error:
+        reason = error.problems[0].expected
+    else:
+        numbers = plain(results)
+        text = in_short(results)
+        main = headline(results)
+        if main != "climbs":
+            velocity = numbers.get(main)
+        reason = _remark(results)
+    return Entry(
+        kind="run",
+        name=path.name,
+        case=case,
+        status="finished",
+        directory=path,
+        age=max(time.time() - (path / MANIFEST_NAME).stat().st_mtime, 0.0),
+        size=size,
+        reason=reason,
+        velocity=velocity,
+        result=text,
+        numbers=numbers,
+        parameters=parameters,
+    )
+
+
+def _remark(results: Results) -> str | None:
+    """A short remark on the run of a deck that was run by hand; None on other runs."""
+    if results.about["deck_edited"]:
+        return "edited and run by hand"
+    return next(iter(results.about["by_hand"]), None)
+
+
+def _unfinished(path: Path, case: str, parameters: FlatCase) -> Entry:
+    place = place_of(path)
+    size, changed = weigh(path)
+    state = state_at(place, path)
+    status, reason = state.status, state.reason
+    if status == "missing":
+        status = "interrupted"
+        reason = state.message
+    elif status == "running":
+        progress = progress_at(place)
+        if progress:
+            reason = progress.stage
+    return Entry(
+        kind="run",
+        name=place.name,
+        case=case,
+        status=status,
+        directory=path,
+        age=max(time.time() - changed, 0.0),
+        size=size,
+        reason=reason,
+        message=state.message,
+        parameters=parameters,
+    )
+
+
+def run_text(directory: Path) -> str:
+    """Status and result of the run in a directory, such as ``finished, 1.08 mm/s``."""
+    run = entry_of(directory)
+    if run is None:
+        return "missing"
+    return f"{run.status}, {run.result}".removesuffix(", -")
+
+
+def weigh(path: Path) -> tuple[int, float]:
+    """Size and time of the last change of a file, or of all files in a directory.
+
+    Files with several names, such as tables that the segments of a pile share, count once.
+
+    Returns
+    -------
+    size : int
+        In bytes.
+    changed : float
+        Time of the last change in s since the epoch; 0 if there is no file.
+    """
+    sizes = {}
+    changed = 0.0
+    for file in [path, *path.rglob("*")]:
+        with suppress(OSError):  # just being removed
+            about = file.lstat()
+            if not S_ISDIR(about.st_mode):
+                sizes[about.st_dev, about.st_ino] = about.st_size
+                changed = max(changed, about.st_mtime)
+    return sum(sizes.values()), changed
+
+
+def bytes_text(size: int) -> str:
+    """A number of bytes, such as ``1.2 MB``."""
+    for name, unit in _SIZES.items():
+        if size >= unit:
+            return f"{size / unit:.3g} {name}"
+    return f"{size} B"
+
+
+def select(runs: Sequence[Entry], where: Iterable[str]) -> list[Entry]:
+    """The runs that have all values (`has_value`).
+
+    Raises
+    ------
+    InputError
+        If a condition cannot be read, or no run has its key.
+    """
+    selected = list(runs)
+    for condition in where:
+        answers = [has_value(run.parameters, condition) for run in selected]
+        if selected and all(answer is None for answer in answers):
+            keys = short_keys(sorted({key for run in selected for key in run.parameters}))
+            near = suggestion(condition.partition("=")[0].strip(), keys)
+            text = f'"{condition}": no run has such a key{near}; runs have {", ".join(keys)}'
+            raise refused("where", text)
+        selected = [run for run, answer in zip(selected, answers, strict=True) if answer]
+    return selected
+
+
+@dataclass(frozen=True)
+class RunsOfCase:
+    """The runs of a case, and the keys by which they differ, without those that follow from given ones."""
+
+    case: str
+    runs: Sequence[Entry]
+    keys: Sequence[str]
+
+    def as_text(self) -> str:
+        """A line for each run, with a column for each key by which the runs differ."""
+        heads = [f"{self.case} ({len(self.runs)})", "status", "result", "age", "size"]
+        lines = [[*heads, *short_keys(self.keys)]]
+        for run in self.runs:
+            status = run.status
+            if run.reason:
+                status = f"{run.status}: {run.reason}"
+            values = [readable(key, run.parameters.get(key)) for key in self.keys]
+            lines.append([run.name, status, run.result, *run.weight, *values])
+        return aligned(lines)
+
+
+def by_case(runs: Sequence[Entry]) -> list[RunsOfCase]:
+    """The runs of each case together."""
+    runs_of: dict[str, list[Entry]] = {}
+    for run in runs:
+        runs_of.setdefault(run.case, []).append(run)
+    groups = []
+    for case, members in runs_of.items():
+        given, derived = differing([run.parameters for run in members if run.parameters])
+        groups.append(RunsOfCase(case, members, given or derived))
+    return groups

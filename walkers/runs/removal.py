@@ -1,0 +1,181 @@
+"""Removal of runs, and of what killed processes left in a folder of runs.
+
+Runs in progress are never removed: removal holds the lock of the run. The manifest of a finished run is removed first:
+after an interruption the rest is no finished run, and the next removal takes it.
+"""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from walkers.files import VTK_SCRATCH, abandoned
+from walkers.rounding import counted, duration_text
+from walkers.runner import directory as on_disk
+from walkers.runner.manifest import MANIFEST_NAME
+from walkers.runs.listing import Entry, bytes_text, place_of, runs_in, weigh
+from walkers.text import aligned
+
+_MOST_LINES = 40
+_IN_PROGRESS = "kept: a process is computing it"
+
+
+class Kind(Enum):
+    """What is removed; an unfinished export is a folder that a killed export to VTK left."""
+
+    RUN = "run"
+    SWEEP = "sweep"
+    LOCK = "stale lock"
+    EXPORT = "unfinished export"
+
+
+@dataclass(frozen=True)
+class Removal:
+    """A directory or a lock file to remove.
+
+    Attributes
+    ----------
+    path
+        The directory or the file.
+    kind
+        What it is.
+    status
+        Of a run: finished, interrupted or failed.
+    remark
+        What the user should know before it is removed.
+    """
+
+    path: Path
+    kind: Kind
+    status: str = ""
+    remark: str = ""
+
+    @property
+    def label(self) -> str:
+        """Its kind as text, such as ``failed run``."""
+        return f"{self.status} {self.kind.value}".lstrip()
+
+
+def unfinished_in(out: Path) -> list[Removal]:
+    """What a folder of runs contains of unfinished work, without runs in progress.
+
+    These are interrupted and failed runs, locks without a process, and folders of killed exports.
+    """
+    runs = runs_in(out)
+    removals = [removal_of(run) for run in runs if run.status != "finished" and is_removable(run)]
+    removals += [Removal(lock, Kind.LOCK) for lock in _stale_locks(out)]
+    removals += [Removal(folder, Kind.EXPORT) for folder in _abandoned_exports(out, runs)]
+    return removals
+
+
+def is_removable(run: Entry) -> bool:
+    """Whether a run is not in progress, and no run is about to be restored from its directory."""
+    if run.status == "running":
+        return False
+    is_replaced = run.directory.name.endswith(on_disk.REPLACED)
+    return not is_replaced or place_of(run.directory).exists()
+
+
+def removal_of(run: Entry) -> Removal:
+    """The removal of a run."""
+    remark = run.reason or ""
+    if run.directory.is_symlink():
+        remark = "a symbolic link: its target stays"
+    elif run.status == "interrupted":
+        remark = f"{run.reason}, can be continued" if run.reason else "can be continued"
+    return Removal(run.directory, Kind.RUN, run.status, remark)
+
+
+def _stale_locks(out: Path) -> list[Path]:
+    locks = [lock for lock in sorted(out.glob("*.lock")) if on_disk.is_run_name(lock.stem)]
+    return [lock for lock in locks if not on_disk.is_locked(lock.with_suffix(""))]
+
+
+def _abandoned_exports(out: Path, runs: Sequence[Entry]) -> list[Path]:
+    """Folders that killed exports left in the folder of runs and in finished runs."""
+    parents = [run.directory for run in runs if run.status == "finished"]
+    if out.is_dir():
+        parents.insert(0, out)
+    exports = []
+    for parent in parents:
+        exports += abandoned(parent, VTK_SCRATCH)
+    return exports
+
+
+def describe(removals: Sequence[Removal]) -> str:
+    """What is to be removed, a line each with the time since its last change, and the total size."""
+    now = time.time()
+    lines = []
+    numbers = Counter[str]()
+    total = 0
+    for removal in removals:
+        size, changed = weigh(removal.path)
+        if removal.path.is_symlink():
+            size = 0
+        age = duration_text(max(now - changed, 0.0))
+        lines.append([removal.path.name, removal.label, age, bytes_text(size), removal.remark])
+        numbers[removal.label] += 1
+        total += size
+    texts = []
+    if lines:
+        texts.append(aligned(lines[:_MOST_LINES]))
+    if len(lines) > _MOST_LINES:
+        texts.append(f"and {len(lines) - _MOST_LINES} more")
+    kinds = ", ".join(counted(number, label) for label, number in numbers.items())
+    texts.append(f"{kinds or 'nothing'} to remove, {bytes_text(total)}")
+    return "\n".join(texts)
+
+
+def remove(removals: Sequence[Removal]) -> dict[Path, str]:
+    """Remove all that no process uses.
+
+    Returns
+    -------
+    dict
+        Paths that are left, with the reason: a run in progress, or an error of the system.
+    """
+    left = {}
+    for removal in removals:
+        try:
+            reason = _remove(removal)
+        except OSError as error:
+            reason = f"cannot be removed whole: {error.strerror or error} ({error.filename})"
+        if reason:
+            left[removal.path] = reason
+    return left
+
+
+def _remove(removal: Removal) -> str:
+    """Remove a directory or a file; return why it is left, or an empty text."""
+    if removal.kind is Kind.RUN:
+        return _remove_run(removal.path)
+    if removal.kind is Kind.LOCK:
+        with on_disk.locked([removal.path.with_suffix("")]):
+            return ""  # a lock file goes with its lock
+    _remove_directory(removal.path)
+    return ""
+
+
+def _remove_run(directory: Path) -> str:
+    place = place_of(directory)
+    with on_disk.locked([place]) as ours:
+        if not ours:
+            return _IN_PROGRESS
+        on_disk.recover(place)
+        if not directory.is_symlink():
+            (directory / MANIFEST_NAME).unlink(missing_ok=True)
+        _remove_directory(directory)
+    return ""
+
+
+def _remove_directory(directory: Path) -> None:
+    """Remove a directory; of a symbolic link, the link alone."""
+    if directory.is_symlink():
+        directory.unlink()
+    elif directory.exists():
+        shutil.rmtree(directory)
