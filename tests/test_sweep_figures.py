@@ -15,7 +15,9 @@ import walkers
 from tests.conftest import TINY, document, to_toml
 from walkers.errors import InputError
 from walkers.runner.directory import case_of
-from walkers.sweeps.figure import SCATTER, LeftOutWarning, factors_of, figure_of
+from walkers.sweeps.factors import factors_of
+from walkers.sweeps.figure import SCATTER, figure_of
+from walkers.sweeps.left_out import LeftOutWarning
 from walkers.theory.prediction import MODEL, PAPER, predict
 
 

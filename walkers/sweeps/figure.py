@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import warnings
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
-from math import ceil, prod, sqrt
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from math import ceil
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -16,28 +12,25 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.arrays import FloatArray
-from walkers.errors import InputError, expected_of, refused
-from walkers.inputs.case_building import changed_case
+from walkers.errors import expected_of, refused
 from walkers.inputs.resolving.library import unmeasured
-from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.numbers import draws_text
-from walkers.postprocess.measure.quantities import declared, is_declared, scatter_of, unit_shown
-from walkers.postprocess.measure.results import derived
-from walkers.postprocess.measure.uncertainty import few_draws
+from walkers.postprocess.measure.quantities import scatter_of
 from walkers.postprocess.show.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
-from walkers.runner.directory import case_of
 from walkers.runs.status import status_text
+from walkers.sweeps.correlations import rank_correlations
+from walkers.sweeps.factors import Factor, numbers_of
 from walkers.sweeps.figure_options import FigureOptions, Log
-from walkers.sweeps.table import FACING_DOWN, SEEDS, default_column, find_name, key_values, together, value_text
-from walkers.text import with_unit
+from walkers.sweeps.layout import layout_of
+from walkers.sweeps.left_out import tell
+from walkers.sweeps.predictions import Predict, Theory
+from walkers.sweeps.table import FACING_DOWN, SEEDS, default_column, find_name
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Predict = Callable[[Sequence[Case], str], tuple[Mapping[str, FloatArray], Mapping[str, int]]]
-"""Function of N cases and a column: predictions of models, SI units, shape (N,); remarks, with the number of cases."""
 SCATTER = "bars: standard deviation of the copies (uncertain parameters not varied)"
 """What the error bars of a sweep are."""
 _BAND = "band: uncertain values only"
@@ -45,59 +38,13 @@ _BAND = "band: uncertain values only"
 _NOT_IN_BAND = "the error of the model is not in it"
 _UP: dict[str, Any] = {"marker": "o", "color": "0.3", "label": "started facing right (up)"}
 _DOWN: dict[str, Any] = {"marker": "v", "color": "0.3", "label": "started facing left (down)"}
-_MOST_PANELS = 12
 _MARKERS = "osD^vXP<>*"
 _MODELS = (("--", "_"), (":", "+"))  # line of each model, and its symbol if points are not joined
-_CURVE = 61  # points of a model's curve
-_OF_SHAPE = ("radii", "volume_fraction", "meniscus_radius", "contact_angle")
-"""Ends of the keys that change the shape of bridges, each of which takes a tenth of a second to solve."""
 _MOST_COLOURS = 10  # of the style
 _ROUNDING = 1e-12  # relative to the largest number
 _LEAST_RANGE = 1e-4  # smallest range of the y axis relative to the mean, so that rounding errors are not shown
 _LETTERS = 26  # letters of a line of a y label
 _FEW_TICKS = 6  # largest number of x values that all have ticks
-
-
-@dataclass(frozen=True)
-class Factor:
-    """A property in which points differ: its keys, its label, and a number (in its unit) or a text for each point.
-
-    Each key of a sample is a factor. Points of a sample do not share values. Those of log-uniform ranges have an axis
-    with a logarithmic scale (``is_log``).
-    """
-
-    keys: tuple[str, ...]
-    label: str
-    values: Sequence[Any]
-    is_number: bool
-    is_sample: bool = False
-    is_log: bool = False
-    unit: str = ""
-
-    @property
-    def levels(self) -> list[Any]:
-        """The different values: numbers in ascending order, texts in the order of the sweep."""
-        different = dict.fromkeys(self.values)
-        return sorted(different) if self.is_number else list(different)
-
-    @property
-    def name(self) -> str:
-        """The label without the unit and without further keys."""
-        first = self.label.partition("\n")[0]
-        return first.removesuffix(f" ({self.unit})") if self.unit else first
-
-    def exact(self, level: float) -> float:
-        """A number, or zero if it is a rounding error."""
-        return 0.0 if abs(level) < _ROUNDING * max(map(abs, self.levels)) else level
-
-    def text(self, level: Any, *, by_name: bool = False) -> str:
-        """A level as text with its unit, for numbers optionally with the factor's name."""
-        text = f"{self.exact(level):.6g} {self.unit}".strip() if self.is_number else str(level)
-        return f"{self.name} = {text}" if by_name and self.is_number else text
-
-
-class LeftOutWarning(UserWarning):
-    """Something is not in a figure: points without a result, keys that are not distinguished, a theory's prediction."""
 
 
 def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), predict: Predict | None = None) -> Figure:
@@ -117,14 +64,14 @@ def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), pre
     if done.empty:
         raise refused(str(table.attrs["sweep"]), f"no point is finished ({unfinished or 'there is none'})")
     if counts:
-        _tell(f"{sum(counts.values())} of {len(table)} points left out: {unfinished}")
+        tell(f"{sum(counts.values())} of {len(table)} points left out: {unfinished}")
     if empty := int(done[column].isna().sum()):
-        _tell(f"{empty} of {len(done)} finished points have no {column}")
+        tell(f"{empty} of {len(done)} finished points have no {column}")
     *layout, undistinguished = layout_of(table, done, options)
     if undistinguished:
-        _tell(f"not distinguished: {'; '.join(undistinguished)}")
+        tell(f"not distinguished: {'; '.join(undistinguished)}")
     log, down = options.log or "", None if options.y else FACING_DOWN.get(column)
-    theory = _Theory.at_points(done, column, log, predict) if predict else None
+    theory = Theory.at_points(done, column, log, predict) if predict else None
     return _draw(done, column, layout, theory, down=down, log=log)
 
 
@@ -133,229 +80,15 @@ def column_of(table: pd.DataFrame, name: str | None) -> str:
     return find_name("y", name, table.columns) if name else default_column(table)
 
 
-def _tell(message: str) -> None:
-    warnings.warn(message, LeftOutWarning, stacklevel=3)
-
-
-def factors_of(table: pd.DataFrame) -> list[Factor]:
-    """The factors of a sweep in the order of its keys, without keys that have one value.
-
-    Keys of one axis are one factor if their numbers rise or fall together, or if they have texts or lists. Otherwise,
-    as in a sample, each key is a factor.
-    """
-    return [factor for keys in table.attrs["axes"] for factor in _of_axis(table, keys)]
-
-
-def _of_axis(table: pd.DataFrame, keys: Sequence[str]) -> list[Factor]:
-    factors = []
-    for key in keys:
-        values, unit = key_values(table, key)
-        is_number, is_log = {*map(type, values)} <= {int, float}, table.attrs.get("sampled", {}).get(key, False)
-        values = [float(value) if is_number else value_text(value, unit) for value in values]
-        unit = (unit or "") if is_number else ""
-        factor = Factor((key,), with_unit(readable_key(key), unit), values, is_number, is_log=is_log, unit=unit)
-        if len(factor.levels) > 1:
-            factors.append(factor)
-    if len(factors) < 2:
-        return factors
-    if not all(factor.is_number for factor in factors):
-        # The texts of one key that distinguishes all levels, or of all keys.
-        texts = [Factor(factor.keys, factor.name, [*map(factor.text, factor.values)], False) for factor in factors]
-        whole = joined(texts)
-        first = next((factor for factor in texts if len(factor.levels) == len(whole.levels)), whole)
-        return [_with(first, factors)]
-    steps = np.diff(np.unique(np.array([factor.values for factor in factors]).T, axis=0), axis=0)
-    together = (steps[:, 0] > 0.0).all() and ((steps > 0.0).all(axis=0) | (steps < 0.0).all(axis=0)).all()
-    return [_with(factors[0], factors)] if together else [replace(factor, is_sample=True) for factor in factors]
-
-
-def _with(first: Factor, factors: Sequence[Factor]) -> Factor:
-    """A factor that stands for others too, which its label names."""
-    rest = [key for factor in factors for key in factor.keys if key not in first.keys]
-    words = f"{len(rest)} further keys" if len(rest) > 2 else ", ".join(map(readable_key, rest))
-    label = f"{first.label}\n(and with it {words})" if rest else first.label
-    return replace(first, keys=(*first.keys, *rest), label=label)
-
-
-def readable_key(key: str) -> str:
-    """A dotted key or a column as words: ``friction bead wall``, ``liquid``; numbers of results by their labels."""
-    table, _, name = key.partition(".")
-    if is_declared(name or table):
-        return declared(name or table).label
-    words = table.partition("[")[0] if name in ("name", "material") else (name or table)
-    return words.replace(".", " ").replace("_", " ")
-
-
-def joined(factors: Sequence[Factor]) -> Factor:
-    """Several factors as one whose levels are texts; a single factor as it is."""
-    if len(factors) == 1:
-        return factors[0]
-    columns = [[factor.text(level, by_name=not factor.unit) for level in factor.values] for factor in factors]
-    keys = tuple(key for factor in factors for key in factor.keys)
-    texts = [", ".join(row) for row in zip(*columns, strict=True)]
-    return Factor(keys, ", ".join(factor.name for factor in factors), texts, False)
-
-
-def _numbers(rows: pd.DataFrame, name: str, option: str) -> Factor:
-    """A column of numbers in its displayed unit."""
-    import pandas as pd
-
-    unit, factor = unit_shown(rows.attrs["units"].get(name) or "")
-    values = pd.to_numeric(rows[name], errors="coerce").to_numpy(dtype=float, na_value=np.nan)
-    if len(rows) and np.isnan(values).all():
-        raise refused(option, f'"{name}" has no number that could be drawn')
-    return Factor((name,), with_unit(readable_key(name), unit), (values * factor).tolist(), True, unit=unit)
-
-
-def layout_of(
-    table: pd.DataFrame, rows: pd.DataFrame, options: FigureOptions = FigureOptions()
-) -> tuple[list[Factor], Factor | None, Factor | None, list[str]]:
-    """Choose the factors on the x axis (of samples one for each panel), in colours and in panels for some rows.
-
-    By default the x axis has the numbers with the most values, colours have the other factor with the most values, and
-    panels have all further factors. Samples have a panel for each key. `InputError` if there is no key or column of an
-    option. The last value has the names of keys that the figure does not distinguish.
-    """
-    places = table.index.get_indexer(rows.index).tolist()
-    left = factors = [
-        replace(factor, values=[factor.values[place] for place in places]) for factor in factors_of(table)
-    ]
-    chosen = {}
-    for option, name in (("x", options.x), ("hue", options.hue), ("panels", options.panels)):
-        if name is not None and not (name == "none" and option != "x"):
-            column = find_name(option, name, [*(key for factor in factors for key in factor.keys), *table.columns])
-            given = next((factor for factor in factors if column in factor.keys), None)
-            if given is None and rows[column].map(lambda value: isinstance(value, str)).all():
-                given = Factor((column,), readable_key(column), rows[column].tolist(), False)
-            chosen[option] = given or _numbers(rows, column, option)
-            left = [factor for factor in left if not _same(factor, chosen[option])]
-    samples = [factor for factor in left if factor.is_sample]
-    left = [factor for factor in left if not factor.is_sample]
-    undistinguished = [factor.name for factor in samples] if "x" in chosen else []
-    along = [chosen["x"]] if "x" in chosen else samples
-    if not along:
-        ranked = [factor for factor in left if factor.is_number] or left or [_numbers(rows, "point", "x")]
-        along = [max(ranked, key=lambda factor: (factor.keys[0] not in SEEDS, len(factor.levels)))]
-    left = [factor for factor in left if factor not in along and factor.keys[0] not in SEEDS]
-    left.sort(key=lambda factor: -len(factor.levels))
-    colours = chosen.get("hue") or (left.pop(0) if left and options.hue is None else None)
-    apart = chosen.get("panels")
-    if len(along) > 1 and apart is not None:
-        raise refused("panels", "expected x too: the samples have a panel for each key")
-    if options.panels is None and left and len(along) == 1:
-        while prod(len(factor.levels) for factor in left) > _MOST_PANELS:
-            undistinguished.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
-        apart, left = joined(left) if left else None, []
-    return along, colours, apart, [*undistinguished, *(factor.name for factor in left)]
-
-
-def _same(first: Factor, second: Factor) -> bool:
-    """Whether two factors distinguish the same points, such as Γ0 and the acceleration."""
-    pairs = len(set(zip(first.values, second.values, strict=True)))
-    return first.keys == second.keys or pairs == len(first.levels) == len(second.levels)
-
-
-def rank_correlations(done: pd.DataFrame, column: str, keys: Sequence[str]) -> dict[str, float] | None:
-    """Rank correlations of a column with drawn keys, the strongest first, if larger than two standard errors.
-
-    Points without a number and walkers that came apart do not count. None if the draws are too few (`few_draws`).
-    """
-    points = together(done).dropna(subset=column)
-    if few_draws(len(points), len(keys)):
-        return None
-    ranks = {key: _rank_correlation(points[key], points[column]) for key in keys}
-    certain = {key: rank for key, rank in ranks.items() if abs(rank) > 2.0 / sqrt(len(points) - 1)}
-    return dict(sorted(certain.items(), key=lambda item: -abs(item[1])))
-
-
-def _rank_correlation(first: Any, second: Any) -> float:
-    """Spearman's correlation of two columns, the correlation of their ranks; 0 if one is constant."""
-    import pandas as pd
-
-    rank = pd.Series(first, dtype=float).rank().corr(pd.Series(second, dtype=float).rank())
-    return 0.0 if np.isnan(rank) else float(rank)
-
-
-@dataclass(frozen=True)
-class _Theory:
-    """Predictions of models for the cases of the points (``values``, in the displayed unit), and between them."""
-
-    predict: Predict
-    done: pd.DataFrame
-    column: str
-    log: str
-    cases: Sequence[Case]
-    values: Mapping[str, FloatArray]
-    remarks: Collection[str]
-
-    @classmethod
-    def at_points(cls, done: pd.DataFrame, column: str, log: str, predict: Predict) -> _Theory | None:
-        """The theory of the points; None if it has no such number, which a warning says."""
-        cases, factor = [case_of(Path(run)) for run in done["run"]], _factor(done, column)
-        predicted, remarks = predict(cases, column)
-        for remark, number in remarks.items():
-            _tell(f"{number} of {len(done)} points: {remark}")
-        values = {model: factor * values for model, values in predicted.items()}
-        return cls(predict, done, column, log, cases, values, remarks.keys()) if values else None
-
-    def curves(
-        self, rows: npt.NDArray[np.int64], at: FloatArray, x: Factor | None
-    ) -> tuple[FloatArray, Mapping[str, FloatArray]]:
-        """Places on the x axis and predictions there: those of the points, which are ``at`` these places.
-
-        A fine curve instead for an axis ``x`` along which the points differ in one number. If x is no key, such as Γ0,
-        the key that varies is changed.
-        """
-        points, case = self.done.iloc[rows], self.cases[rows[0]]
-        of_points = at, {model: values[rows] for model, values in self.values.items()}
-        moving = [key for key in self.done.attrs["varied"] if points[key].nunique() > 1]
-        if x is None or len(moving) != 1 or not (x.keys[0] in moving or x.keys[0] in derived(case)):
-            return of_points
-        key, name = moving[0], x.keys[0]
-        if key.endswith(_OF_SHAPE) or points[key].dtype.kind not in "if":
-            return of_points
-        low, high = float(points[key].min()), float(points[key].max())
-        spacing = np.geomspace if "x" in self.log and low > 0.0 else np.linspace
-        numbers = spacing(low, high, _CURVE).tolist()
-        unit = self.done.attrs["units"][key] or ""
-        cases = [(low, _with_number(case, key, low, unit))]
-        for value in numbers[1:-1]:
-            # Between two points there may be values that no case has, such as half an integer.
-            with suppress(InputError):
-                cases.append((value, _with_number(case, key, value, unit)))
-        cases.append((high, _with_number(case, key, high, unit)))
-        predicted, remarks = self.predict([moved for _, moved in cases], self.column)
-        if predicted.keys() != self.values.keys():
-            return of_points
-        if not all(np.isfinite(values).all() for values in predicted.values()):
-            for remark in remarks.keys() - self.remarks:
-                _tell(f"the theory's curve has gaps: {remark}")
-        along = [value if name == key else _factor(self.done, name) * derived(moved)[name] for value, moved in cases]
-        factor = _factor(self.done, self.column)
-        return np.array(along), {model: factor * values for model, values in predicted.items()}
-
-
-def _with_number(case: Case, key: str, value: float, unit: str) -> Case:
-    """The case with a number of a key in a unit; without a unit it is a plain number, in case files too."""
-    if unit:
-        return changed_case(case, {key: f"{value!r} {unit}"})
-    return changed_case(case, {key: int(value) if value.is_integer() else value})
-
-
-def _factor(done: pd.DataFrame, column: str) -> float:
-    """How many displayed units an SI unit of a column is."""
-    return unit_shown(done.attrs["units"].get(column) or "")[1]
-
-
 def _points(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.DataFrame]:
     """Label and values of a column in its displayed unit, errors, and values of walkers that face down a slope."""
     import pandas as pd
 
-    label, points = _numbers(done, column, "y").label, pd.DataFrame({"error": np.full(len(done), np.nan)})
+    label, points = numbers_of(done, column, "y").label, pd.DataFrame({"error": np.full(len(done), np.nan)})
     sources = {"value": column, "error": scatter_of(column), "low": f"{column}_low", "high": f"{column}_high"}
     for name, source in {**sources, "down": down}.items():
         if source and source in done and done[source].notna().any():
-            points[name] = _numbers(done, source, "y").values
+            points[name] = numbers_of(done, source, "y").values
     return label.replace(", facing right (up)", "") if "down" in points else label, points
 
 
@@ -371,7 +104,7 @@ def _draw(
     done: pd.DataFrame,
     column: str,
     layout: Sequence[Any],
-    theory: _Theory | None,
+    theory: Theory | None,
     *,
     down: str | None,
     log: str,
@@ -473,7 +206,7 @@ def _series(
     drawn: npt.NDArray[np.bool_],
     aside: float,
     points: pd.DataFrame,
-    theory: _Theory | None,
+    theory: Theory | None,
     look: Mapping[str, Any],
 ) -> None:
     """Means with error bars, joined by lines unless there is a theory, and the predictions of the theory.

@@ -12,7 +12,9 @@ from walkers.files import write_bytes
 from walkers.postprocess.measure.results import read
 from walkers.postprocess.measure.uncertainty import lines_of_rest
 from walkers.postprocess.show.report.page import NAME, check_report, fill, page_of, svg_of
-from walkers.sweeps.figure import LeftOutWarning, figure_of, readable_key
+from walkers.sweeps.factors import readable_key
+from walkers.sweeps.figure import figure_of
+from walkers.sweeps.left_out import LeftOutWarning
 from walkers.sweeps.table import cells_of, load
 
 if TYPE_CHECKING:

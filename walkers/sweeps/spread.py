@@ -27,7 +27,9 @@ from walkers.rounding import counted, rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import run_place
 from walkers.runs.case_text import kind_of
-from walkers.sweeps.figure import LeftOutWarning, figure_of, rank_correlations
+from walkers.sweeps.correlations import rank_correlations
+from walkers.sweeps.figure import figure_of
+from walkers.sweeps.left_out import LeftOutWarning
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.sweeps.table import load, main_columns, together
 

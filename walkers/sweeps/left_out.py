@@ -1,0 +1,14 @@
+"""Warnings about what a figure of a sweep leaves out."""
+
+from __future__ import annotations
+
+import warnings
+
+
+class LeftOutWarning(UserWarning):
+    """Something is not in a figure: points without a result, keys that are not distinguished, a theory's prediction."""
+
+
+def tell(message: str) -> None:
+    """Warn that something is not in a figure."""
+    warnings.warn(message, LeftOutWarning, stacklevel=3)
