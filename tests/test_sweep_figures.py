@@ -1,6 +1,8 @@
 """Figures of sweeps: what goes where, what is drawn, what is left out and said."""
 
 import shutil
+import warnings
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from walkers.errors import InputError
 from walkers.runner.directory import case_of
 from walkers.sweeps.factors import factors_of
 from walkers.sweeps.figure import SCATTER, figure_of
+from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.left_out import LeftOutWarning
 from walkers.theory.prediction import MODEL, PAPER, predict
 
@@ -81,7 +84,7 @@ def test_axes_do_not_magnify_rounding() -> None:
 
 
 def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_through: Path) -> None:
-    figure = walkers.load(looked_through / "three").figure()
+    figure = walkers.load(looked_through / "three").figure(panels="frequency")
     first, second = _panels(figure)
     titles = [axes.get_title(loc="left") for axes in (first, second)]
     assert titles == ["(a) frequency = 60 Hz", "(b) frequency = 80 Hz"]
@@ -94,6 +97,63 @@ def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_
         assert y == pytest.approx(rows["velocity"].to_numpy() * 1e3)
         assert errors == pytest.approx(rows["scatter"].to_numpy() * 1e3)
         assert (errors > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("keys", "options", "message"),
+    [
+        (
+            ["drive.frequency", "contact.restitution", "contact.friction.bead_wall"],
+            {},
+            "panels: contact.friction.bead_wall varies beside drive.frequency (x), contact.restitution (hue): "
+            "expected contact.friction.bead_wall, or none to draw all values alike",
+        ),
+        (
+            ["drive.frequency", "contact.restitution", "contact.friction.bead_wall", "boundary.tilt"],
+            {"x": "restitution"},
+            "panels: contact.friction.bead_wall, boundary.tilt vary beside contact.restitution (x), "
+            "drive.frequency (hue): expected one of them, with the others fixed in the sweep file, "
+            "or none to draw all values alike",
+        ),
+        (
+            ["drive.frequency", "contact.restitution", "contact.friction.bead_wall", "boundary.tilt"],
+            {"panels": "tilt"},
+            "hue: contact.friction.bead_wall varies beside drive.frequency (x), contact.restitution (hue), "
+            "boundary.tilt (panels): expected fewer keys in the sweep file, or none to draw all values alike",
+        ),
+    ],
+)
+def test_a_figure_does_not_hide_keys_unless_it_is_told_to(
+    keys: list[str], options: dict[str, str], message: str
+) -> None:
+    rows = [list(values) for values in product((0.1, 0.2), repeat=len(keys))]
+    table = _table(dict.fromkeys(keys, ""), rows, velocity=np.arange(len(rows)) * 1e-3)
+    table.attrs["axes"] = [(key,) for key in keys]
+    with pytest.raises(InputError) as refused:
+        figure_of(table, FigureOptions(**options))
+    assert str(refused.value) == message
+    option = message.partition(":")[0]
+    with pytest.warns(LeftOutWarning, match="not distinguished: .*friction bead wall"):
+        (panel, *_) = _panels(figure_of(table, FigureOptions(**{**options, option: "none"})))
+    assert panel.lines[0].get_linestyle() == "None", "points of several values are not joined by a line"
+
+
+def test_colours_have_the_first_other_key_and_what_follows_from_shown_columns_is_not_hidden() -> None:
+    """Tilt and restitution follow from the panel and the colour, the seed repeats; the axis has most values."""
+    keys = ["drive.frequency", "boundary.tilt", "contact.restitution", "drive.peak_acceleration", "run.seed"]
+    rows = [
+        [frequency, tilt, 0.3 + tilt / 100.0, acceleration, seed]
+        for frequency, tilt, acceleration, seed in product((60, 70), (0, 10), (2, 4, 6), (1, 2))
+    ]
+    table = _table(dict.fromkeys(keys, ""), rows, velocity=1e-3).assign(slope=[row[1] for row in rows])
+    table.attrs["axes"] = [(keys[0],), (keys[1],), (keys[2],), (keys[3],), (keys[4],)]
+    table.attrs["units"] |= {"slope": ""}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = figure_of(table, FigureOptions(panels="slope"))
+    assert [axes.get_title(loc="left") for axes in _panels(figure)] == ["(a) slope = 0", "(b) slope = 10"]
+    assert {axes.get_xlabel() for axes in _panels(figure)} == {"peak acceleration"}
+    assert _legend(figure) == ["60", "70"]
 
 
 def test_what_goes_where_can_be_chosen(looked_through: Path) -> None:

@@ -47,6 +47,14 @@ class Factor:
         first = self.label.partition("\n")[0]
         return first.removesuffix(f" ({self.unit})") if self.unit else first
 
+    def is_among(self, factors: Sequence[Factor]) -> bool:
+        """Whether one of several factors has the keys of this one, or distinguishes the same points."""
+        for factor in factors:
+            pairs = len(set(zip(self.values, factor.values, strict=True)))
+            if self.keys == factor.keys or pairs == len(self.levels) == len(factor.levels):
+                return True
+        return False
+
     def exact(self, level: float) -> float:
         """A number, or zero if it is a rounding error."""
         return 0.0 if abs(level) < _ROUNDING * max(map(abs, self.levels)) else level
@@ -60,41 +68,82 @@ class Factor:
 def factors_of(table: pd.DataFrame) -> list[Factor]:
     """The factors of a sweep in the order of its keys, without keys that have one value.
 
-    Keys of one axis are one factor if their numbers rise or fall together, or if they have texts or lists. Otherwise,
-    as in a sample, each key is a factor.
+    The keys of an axis are one factor if their numbers rise or fall together, or if some have texts
+    or lists. Otherwise, as in a sample, each key is a factor.
     """
-    return [factor for keys in table.attrs["axes"] for factor in _of_axis(table, keys)]
-
-
-def _of_axis(table: pd.DataFrame, keys: Sequence[str]) -> list[Factor]:
     factors = []
-    for key in keys:
-        values, unit = key_values(table, key)
-        is_number, is_log = {*map(type, values)} <= {int, float}, table.attrs.get("sampled", {}).get(key, False)
-        values = [float(value) if is_number else value_text(value, unit) for value in values]
-        unit = (unit or "") if is_number else ""
-        factor = Factor((key,), with_unit(readable_key(key), unit), values, is_number, is_log=is_log, unit=unit)
-        if len(factor.levels) > 1:
-            factors.append(factor)
+    for keys in table.attrs["axes"]:
+        factors += _factors_of_axis(table, keys)
+    return factors
+
+
+def _factors_of_axis(table: pd.DataFrame, keys: Sequence[str]) -> list[Factor]:
+    factors = [_factor_of_key(table, key) for key in keys]
+    factors = [factor for factor in factors if len(factor.levels) > 1]
     if len(factors) < 2:
         return factors
     if not all(factor.is_number for factor in factors):
-        # The texts of one key that distinguishes all levels, or of all keys.
-        texts = [Factor(factor.keys, factor.name, [*map(factor.text, factor.values)], False) for factor in factors]
-        whole = joined(texts)
-        first = next((factor for factor in texts if len(factor.levels) == len(whole.levels)), whole)
-        return [_with(first, factors)]
-    steps = np.diff(np.unique(np.array([factor.values for factor in factors]).T, axis=0), axis=0)
-    together = (steps[:, 0] > 0.0).all() and ((steps > 0.0).all(axis=0) | (steps < 0.0).all(axis=0)).all()
-    return [_with(factors[0], factors)] if together else [replace(factor, is_sample=True) for factor in factors]
+        return [_named_points(factors)]
+    if _change_together(factors):
+        return [_with_further_keys(factors[0], factors)]
+    return [replace(factor, is_sample=True) for factor in factors]
 
 
-def _with(first: Factor, factors: Sequence[Factor]) -> Factor:
-    """A factor that stands for others too, which its label names."""
-    rest = [key for factor in factors for key in factor.keys if key not in first.keys]
-    words = f"{len(rest)} further keys" if len(rest) > 2 else ", ".join(map(readable_key, rest))
-    label = f"{first.label}\n(and with it {words})" if rest else first.label
-    return replace(first, keys=(*first.keys, *rest), label=label)
+def _factor_of_key(table: pd.DataFrame, key: str) -> Factor:
+    values, unit = key_values(table, key)
+    is_number = all(type(value) in (int, float) for value in values)
+    if not is_number:
+        texts = [value_text(value, unit) for value in values]
+        return Factor((key,), readable_key(key), texts, is_number=False)
+    return Factor(
+        keys=(key,),
+        label=with_unit(readable_key(key), unit or ""),
+        values=[float(value) for value in values],
+        is_number=True,
+        is_log=table.attrs.get("sampled", {}).get(key, False),
+        unit=unit or "",
+    )
+
+
+def _change_together(factors: Sequence[Factor]) -> bool:
+    """Whether numbers of all factors rise, or fall, wherever those of the first rise."""
+    points = np.unique(np.array([factor.values for factor in factors]).T, axis=0)
+    steps = np.diff(points, axis=0)
+    rise = np.all(steps > 0.0, axis=0)
+    fall = np.all(steps < 0.0, axis=0)
+    return bool(np.all(steps[:, 0] > 0.0) and np.all(rise | fall))
+
+
+def _named_points(factors: Sequence[Factor]) -> Factor:
+    """The factor of an axis whose points have names.
+
+    The names are the values of the first key that tells all points apart, or those of all keys.
+    """
+    points = list(zip(*(factor.values for factor in factors), strict=True))
+    for factor in factors:
+        if len(factor.levels) == len(set(points)):
+            texts = [factor.text(value) for value in factor.values]
+            named = Factor(factor.keys, factor.name, texts, is_number=False)
+            return _with_further_keys(named, factors)
+    texts = []
+    for point in points:
+        values = [factor.text(value) for factor, value in zip(factors, point, strict=True)]
+        texts.append(", ".join(values))
+    keys = tuple(key for factor in factors for key in factor.keys)
+    label = ", ".join(factor.name for factor in factors)
+    return Factor(keys, label, texts, is_number=False)
+
+
+def _with_further_keys(first: Factor, factors: Sequence[Factor]) -> Factor:
+    """The first of several factors that change together; its label names the others."""
+    further = [key for factor in factors for key in factor.keys if key not in first.keys]
+    if not further:
+        return first
+    words = ", ".join(readable_key(key) for key in further)
+    if len(further) > 2:
+        words = f"{len(further)} further keys"
+    label = f"{first.label}\n(and with it {words})"
+    return replace(first, keys=(*first.keys, *further), label=label)
 
 
 def readable_key(key: str) -> str:
@@ -104,16 +153,6 @@ def readable_key(key: str) -> str:
         return declared(name or table).label
     words = table.partition("[")[0] if name in ("name", "material") else (name or table)
     return words.replace(".", " ").replace("_", " ")
-
-
-def joined(factors: Sequence[Factor]) -> Factor:
-    """Several factors as one whose levels are texts; a single factor as it is."""
-    if len(factors) == 1:
-        return factors[0]
-    columns = [[factor.text(level, by_name=not factor.unit) for level in factor.values] for factor in factors]
-    keys = tuple(key for factor in factors for key in factor.keys)
-    texts = [", ".join(row) for row in zip(*columns, strict=True)]
-    return Factor(keys, ", ".join(factor.name for factor in factors), texts, False)
 
 
 def numbers_of(rows: pd.DataFrame, name: str, option: str) -> Factor:

@@ -21,7 +21,7 @@ from walkers.runs.status import status_text
 from walkers.sweeps.correlations import rank_correlations
 from walkers.sweeps.factors import Factor, numbers_of
 from walkers.sweeps.figure_options import FigureOptions, Log
-from walkers.sweeps.layout import layout_of
+from walkers.sweeps.layout import Layout, layout_of
 from walkers.sweeps.left_out import tell
 from walkers.sweeps.predictions import Predict, Theory
 from walkers.sweeps.table import FACING_DOWN, SEEDS, default_column, find_name
@@ -67,11 +67,12 @@ def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), pre
         tell(f"{sum(counts.values())} of {len(table)} points left out: {unfinished}")
     if empty := int(done[column].isna().sum()):
         tell(f"{empty} of {len(done)} finished points have no {column}")
-    *layout, undistinguished = layout_of(table, done, options)
-    if undistinguished:
-        tell(f"not distinguished: {'; '.join(undistinguished)}")
-    log, down = options.log or "", None if options.y else FACING_DOWN.get(column)
+    layout = layout_of(table, done, options)
+    if layout.hidden:
+        tell(f"not distinguished: {'; '.join(factor.name for factor in layout.hidden)}")
+    log = options.log or ""
     theory = Theory.at_points(done, column, log, predict) if predict else None
+    down = None if options.y else FACING_DOWN.get(column)
     return _draw(done, column, layout, theory, down=down, log=log)
 
 
@@ -103,14 +104,14 @@ def _draws(done: pd.DataFrame, column: str) -> str:
 def _draw(
     done: pd.DataFrame,
     column: str,
-    layout: Sequence[Any],
+    layout: Layout,
     theory: Theory | None,
     *,
     down: str | None,
     log: str,
 ) -> Figure:
     """Draw a column with the factors of `layout_of`."""
-    along, hue, panels = layout
+    along, hue, panels = layout.along, layout.hue, layout.panels
     if "x" in log and not all(factor.is_number for factor in along):
         raise refused("log", f"{along[0].label} has no numbers")
     label, points = _points(done, column, down)

@@ -18,13 +18,14 @@ class FigureOptions:
     Parameters
     ----------
     x
-        Sweeps: key or column on the x axis, such as drive.frequency, frequency or gamma0.
+        Sweeps: key or column on the x axis, such as drive.frequency, frequency or gamma0; default:
+        the key with the most values.
     y
         Sweeps: column of the table; default: velocity, or climbs for piles.
     hue
-        Sweeps: key or column that sets the colour, or none.
+        Sweeps: key or column that sets the colour, or none; default: the first key that is not x.
     panels
-        Sweeps: key or column that sets the panel, or none.
+        Sweeps: key or column that sets the panel, or none to draw all values of further keys alike.
     log
         Sweeps: which axes are logarithmic.
     theory

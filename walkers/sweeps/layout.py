@@ -2,64 +2,153 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from math import prod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from walkers.errors import refused
-from walkers.sweeps.factors import Factor, factors_of, joined, numbers_of, readable_key
+from walkers.errors import InputError, refused
+from walkers.sweeps.factors import Factor, factors_of, numbers_of, readable_key
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.table import SEEDS, find_name
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_MOST_PANELS = 12
+NONE = "none"
+"""What an option says to leave out colours or panels."""
 
 
-def layout_of(
-    table: pd.DataFrame, rows: pd.DataFrame, options: FigureOptions = FigureOptions()
-) -> tuple[list[Factor], Factor | None, Factor | None, list[str]]:
-    """Choose the factors on the x axis (of samples one for each panel), in colours and in panels for some rows.
+@dataclass(frozen=True)
+class Layout:
+    """What a figure of a sweep shows where.
 
-    By default the x axis has the numbers with the most values, colours have the other factor with the most values, and
-    panels have all further factors. Samples have a panel for each key. `InputError` if there is no key or column of an
-    option. The last value has the names of keys that the figure does not distinguish.
+    Attributes
+    ----------
+    along
+        The factor on the x axis; of a sample, the factors on the x axes of one panel each.
+    hue
+        The factor that colours tell apart, if there is one.
+    panels
+        The factor that panels tell apart, if there is one.
+    hidden
+        Factors in which points differ that look alike.
     """
-    places = table.index.get_indexer(rows.index).tolist()
-    left = factors = [
-        replace(factor, values=[factor.values[place] for place in places]) for factor in factors_of(table)
-    ]
-    chosen = {}
-    for option, name in (("x", options.x), ("hue", options.hue), ("panels", options.panels)):
-        if name is not None and not (name == "none" and option != "x"):
-            column = find_name(option, name, [*(key for factor in factors for key in factor.keys), *table.columns])
-            given = next((factor for factor in factors if column in factor.keys), None)
-            if given is None and rows[column].map(lambda value: isinstance(value, str)).all():
-                given = Factor((column,), readable_key(column), rows[column].tolist(), False)
-            chosen[option] = given or numbers_of(rows, column, option)
-            left = [factor for factor in left if not _same(factor, chosen[option])]
-    samples = [factor for factor in left if factor.is_sample]
-    left = [factor for factor in left if not factor.is_sample]
-    undistinguished = [factor.name for factor in samples] if "x" in chosen else []
-    along = [chosen["x"]] if "x" in chosen else samples
-    if not along:
-        ranked = [factor for factor in left if factor.is_number] or left or [numbers_of(rows, "point", "x")]
-        along = [max(ranked, key=lambda factor: (factor.keys[0] not in SEEDS, len(factor.levels)))]
-    left = [factor for factor in left if factor not in along and factor.keys[0] not in SEEDS]
-    left.sort(key=lambda factor: -len(factor.levels))
-    colours = chosen.get("hue") or (left.pop(0) if left and options.hue is None else None)
-    apart = chosen.get("panels")
-    if len(along) > 1 and apart is not None:
+
+    along: Sequence[Factor]
+    hue: Factor | None = None
+    panels: Factor | None = None
+    hidden: Sequence[Factor] = ()
+
+
+def layout_of(table: pd.DataFrame, rows: pd.DataFrame, options: FigureOptions = FigureOptions()) -> Layout:
+    """The layout of a figure of some rows of a sweep's table.
+
+    Without options, the x axis has the key with the most numbers, or of a sample each key in a
+    panel of its own; colours have the first other key. Random seeds are shown on the x axis or not
+    at all.
+
+    Parameters
+    ----------
+    table
+        The table of the sweep.
+    rows
+        The rows to draw.
+    options
+        ``x``, ``hue`` and ``panels``: a key, a column, or ``none`` (not for x).
+
+    Raises
+    ------
+    InputError
+        If there is no key or column of a name, or more keys vary than the figure shows and no
+        option says ``none``.
+    """
+    factors = _factors_of_rows(table, rows)
+    x = _chosen("x", options.x, factors, rows)
+    hue = _chosen("hue", options.hue, factors, rows)
+    panels = _chosen("panels", options.panels, factors, rows)
+    chosen = [factor for factor in (x, hue, panels) if factor is not None]
+    left = [factor for factor in factors if not factor.is_among(chosen)]
+    along = [x] if x else _default_x(left, rows)
+    if len(along) > 1 and panels:
         raise refused("panels", "expected x too: the samples have a panel for each key")
-    if options.panels is None and left and len(along) == 1:
-        while prod(len(factor.levels) for factor in left) > _MOST_PANELS:
-            undistinguished.append(left.pop(0 if len(left[0].levels) > _MOST_PANELS else -1).name)
-        apart, left = joined(left) if left else None, []
-    return along, colours, apart, [*undistinguished, *(factor.name for factor in left)]
+    left = [factor for factor in left if factor not in along and factor.keys[0] not in SEEDS]
+    if options.hue is None:
+        hue = next((factor for factor in left if not factor.is_sample), None)
+    shown = [factor for factor in (hue, panels) if factor]
+    shown += [factor for factor in factors if factor.is_among(along) and not factor.is_sample]
+    hidden = [factor for factor in left if not _follows_from(shown, factor)]
+    layout = Layout(along, hue, panels, hidden)
+    if NONE not in (options.hue, options.panels):
+        _check_all_shown(layout)
+    return layout
 
 
-def _same(first: Factor, second: Factor) -> bool:
-    """Whether two factors distinguish the same points, such as Γ0 and the acceleration."""
-    pairs = len(set(zip(first.values, second.values, strict=True)))
-    return first.keys == second.keys or pairs == len(first.levels) == len(second.levels)
+def _factors_of_rows(table: pd.DataFrame, rows: pd.DataFrame) -> list[Factor]:
+    """The factors of a table, with the values of some of its rows."""
+    places = table.index.get_indexer(rows.index).tolist()
+    factors = []
+    for factor in factors_of(table):
+        values = [factor.values[place] for place in places]
+        factors.append(replace(factor, values=values))
+    return factors
+
+
+def _chosen(option: str, name: str | None, factors: Sequence[Factor], rows: pd.DataFrame) -> Factor | None:
+    """The factor of a key or a column that an option names; None without a name."""
+    if name is None or (name == NONE and option != "x"):
+        return None
+    keys = [key for factor in factors for key in factor.keys]
+    column = find_name(option, name, [*keys, *rows.columns])
+    for factor in factors:
+        if column in factor.keys:
+            return factor
+    values = rows[column].tolist()
+    if all(isinstance(value, str) for value in values):
+        return Factor((column,), readable_key(column), values, is_number=False)
+    return numbers_of(rows, column, option)
+
+
+def _default_x(factors: Sequence[Factor], rows: pd.DataFrame) -> list[Factor]:
+    """The keys of a sample; otherwise the numbers with the most values, and no seeds if there are other keys."""
+    samples = [factor for factor in factors if factor.is_sample]
+    if samples:
+        return samples
+    candidates = [factor for factor in factors if factor.keys[0] not in SEEDS] or factors
+    candidates = [factor for factor in candidates if factor.is_number] or candidates
+    if not candidates:
+        return [numbers_of(rows, "point", "x")]
+    return [max(candidates, key=lambda factor: len(factor.levels))]
+
+
+def _follows_from(shown: Sequence[Factor], factor: Factor) -> bool:
+    """Whether points that look alike in a figure have the same level of a factor."""
+    level_of: dict[tuple[object, ...], object] = {}
+    for number, level in enumerate(factor.values):
+        look = tuple(visible.values[number] for visible in shown)
+        if level_of.setdefault(look, level) != level:
+            return False
+    return True
+
+
+def _check_all_shown(layout: Layout) -> None:
+    """Refuse a layout that hides keys of the sweep; it cannot show the keys of a sample."""
+    hidden = [factor.keys[0] for factor in layout.hidden if not factor.is_sample]
+    if hidden:
+        raise _hides(layout, hidden)
+
+
+def _hides(layout: Layout, hidden: Sequence[str]) -> InputError:
+    """An error that says which keys the figure does not show, and how it can."""
+    shown = [f"{factor.keys[0]} (x)" for factor in layout.along]
+    if layout.hue:
+        shown.append(f"{layout.hue.keys[0]} (hue)")
+    if layout.panels:
+        shown.append(f"{layout.panels.keys[0]} (panels)")
+    vary = f"{', '.join(hidden)} {'varies' if len(hidden) == 1 else 'vary'} beside {', '.join(shown)}"
+    if layout.panels:
+        return refused("hue", f"{vary}: expected fewer keys in the sweep file, or none to draw all values alike")
+    if len(hidden) > 1:
+        advice = "expected one of them, with the others fixed in the sweep file"
+    else:
+        advice = f"expected {hidden[0]}"
+    return refused("panels", f"{vary}: {advice}, or none to draw all values alike")

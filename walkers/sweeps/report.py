@@ -14,6 +14,8 @@ from walkers.postprocess.measure.uncertainty import lines_of_rest
 from walkers.postprocess.show.report.page import NAME, check_report, fill, page_of, svg_of
 from walkers.sweeps.factors import readable_key
 from walkers.sweeps.figure import figure_of
+from walkers.sweeps.figure_options import FigureOptions
+from walkers.sweeps.layout import NONE
 from walkers.sweeps.left_out import LeftOutWarning
 from walkers.sweeps.table import cells_of, load
 
@@ -53,11 +55,11 @@ def report_sweep(directory: Path, to: Path | None = None) -> Path:
 
 
 def _figure(frame: pd.DataFrame) -> tuple[str, list[str]]:
-    """The figure as SVG, and the reasons why points are left out; an empty text if no point can be drawn."""
+    """The figure as SVG, and the reasons why points are left out or look alike; no SVG if no point can be drawn."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LeftOutWarning)
         try:
-            svg = svg_of(figure_of(frame))
+            svg = svg_of(figure_of(frame, FigureOptions(panels=NONE)))
         except InputError as error:
             return "", [str(error)]
     return svg, [str(warning.message) for warning in caught]
