@@ -137,6 +137,21 @@ def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
     assert repr(walkers.load(table["run"][0])) == f"Run({table['run'][0]}: finished, at rest)"
 
 
+def test_the_table_of_a_finished_sweep_is_read_once_until_it_is_refreshed(out: Path) -> None:
+    """That of an unfinished sweep is read each time: its points may be finished meanwhile."""
+    sweep = walkers.load(out / "grid")
+    first, *_ = sweep.table()["run"]
+    changed = sweep.table()
+    changed["velocity"] = 0.0  # the user's table, not that of the sweep
+    assert (sweep.table()["velocity"] != 0.0).all()
+    away = Path(f"{first}.away")
+    Path(first).rename(away)
+    assert sweep.status == "finished"
+    assert sweep.refresh().table()["status"].tolist().count("missing") == 1
+    away.rename(first)
+    assert sweep.status == "finished"
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -18,10 +18,17 @@ from tests.conftest import TINY, document, to_toml
 from walkers.errors import InputError
 from walkers.runner.directory import case_of
 from walkers.sweeps.factors import factors_of
-from walkers.sweeps.figure import SCATTER, figure_of
+from walkers.sweeps.figure import SCATTER
+from walkers.sweeps.figure import figure_of as figure_of_table
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.left_out import LeftOutWarning
+from walkers.sweeps.record import read_record
+from walkers.sweeps.table import SweepTable, table_of
 from walkers.theory.prediction import MODEL, PAPER, predict
+
+
+def figure_of(frame: pd.DataFrame, options: FigureOptions = FigureOptions()) -> Figure:
+    return figure_of_table(SweepTable(frame), options)
 
 
 def _panels(figure: Figure) -> list[Axes]:
@@ -269,8 +276,8 @@ def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> N
         assert np.interp(points, x, y) == pytest.approx(wanted, rel=5e-3)
     far = {"runs'": [1e-3, 2e-3], "far above": [0.1, 0.2]}
     (axes,) = _panels(
-        figure_of(
-            walkers.load(directory).table(),
+        figure_of_table(
+            table_of(read_record(directory)),
             predict=lambda cases, _: ({name: np.linspace(*ends, len(cases)) for name, ends in far.items()}, {}),
         )
     )

@@ -28,6 +28,7 @@ from walkers.postprocess.show.drawing import FORMATS, check_place, save_figure
 from walkers.postprocess.show.figures import plot_run
 from walkers.postprocess.show.film_options import FilmOptions
 from walkers.postprocess.show.films import render_film
+from walkers.postprocess.show.report.page import NAME as REPORT_NAME
 from walkers.postprocess.show.report.player import player_of
 from walkers.postprocess.show.report.run import report_run, result_html
 from walkers.postprocess.show.series import render_series
@@ -47,7 +48,7 @@ from walkers.sweeps.accuracy import measure_accuracy
 from walkers.sweeps.climbing import conditions_in, summarise_climbs, write_climbs
 from walkers.sweeps.figure import column_of, figure_of
 from walkers.sweeps.figure_options import FigureOptions
-from walkers.sweeps.record import read_record
+from walkers.sweeps.record import SweepRecord, read_record
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.sweeps.site import load_site
@@ -430,7 +431,7 @@ class Sweep:
     def __post_init__(self) -> None:
         """Make a path of the name of a directory; `InputError` if it has no sweep."""
         object.__setattr__(self, "directory", Path(self.directory))
-        _ = self.runs
+        _ = self._record
 
     def __repr__(self) -> str:
         """Name and numbers of points by status in a line."""
@@ -438,26 +439,45 @@ class Sweep:
 
     def summary(self) -> str:
         """The status of the points and their failures."""
-        return of_points.describe_status(self.table())
+        return of_points.describe_status(self._table.frame)
 
     @property
     def status(self) -> str:
         """``finished``, ``running``, ``failed`` (some points) or ``interrupted`` (points are missing)."""
-        return worst_status(self.table()["status"])
+        return worst_status(self._table.frame["status"])
 
     @cached_property
     def runs(self) -> list[Run]:
         """The runs of all points, finished or not."""
-        record = read_record(self.directory)
-        return [Run(record.out / name) for name in record.runs]
+        return [Run(self._record.out / name) for name in self._record.runs]
 
     def table(self) -> pd.DataFrame:
-        """One row per point; see `walkers.sweeps.table.load`."""
-        return of_points.load(self.directory)
+        """One row per point; see `walkers.sweeps.table.load`. Kept once all points are finished; see `refresh`."""
+        return self._table.frame.copy()
+
+    def refresh(self) -> Sweep:
+        """Forget the table, so that it is read again: after runs of a finished sweep were measured again or removed."""
+        self.__dict__.pop("_finished_table", None)
+        return self
+
+    @cached_property
+    def _record(self) -> SweepRecord:
+        return read_record(self.directory)
+
+    @property
+    def _table(self) -> of_points.SweepTable:
+        """The table with its results, read again as long as points are not finished."""
+        table: of_points.SweepTable | None = self.__dict__.get("_finished_table")
+        if table is None:
+            table = of_points.table_of(self._record)
+            if len(table.finished) == len(table.frame):
+                self.__dict__["_finished_table"] = table
+        return table
 
     def describe(self) -> str:
         """The status of the points, their failures, and the table in mm, mm/s, nJ and degrees."""
-        return f"{self.summary()}\n\n{of_points.short_text(self.table().drop(columns='run'))}"
+        frame = self._table.frame
+        return f"{of_points.describe_status(frame)}\n\n{of_points.short_text(frame.drop(columns='run'))}"
 
     def _repr_html_(self) -> str:
         """The table in a notebook."""
@@ -477,20 +497,20 @@ class Sweep:
             import matplotlib.pyplot as plt
 
             plt.switch_backend(plt.rcParams["backend"])  # which tells the notebook how to show figures
-        return _figure(self.table(), options)
+        return _figure(self._table, options)
 
     def plot(self, to: str | Path | None = None, **options: Any) -> Pictures:
         """Plot the table to a file as in `figure`; by default in the sweep's directory, named after the column."""
-        table = self.table()
-        place = _path(to) or self.directory / f"{column_of(table, options.get('y'))}.png"
+        table = self._table
+        place = _path(to) or self.directory / f"{column_of(table.frame, options.get('y'))}.png"
         check_place(place, *(f".{form}" for form in FORMATS))
-        runs = [Path(run).name for run in table.loc[table["status"] == "finished", "run"]]
+        runs = [Path(run).name for run in table.finished["run"]]
         form = place.suffix.lower()[1:]
-        return Pictures(save_figure(_figure(table, options), place, runs, form, str(table.attrs["sweep"])))
+        return Pictures(save_figure(_figure(table, options), place, runs, form, str(table.frame.attrs["sweep"])))
 
     def report(self, to: str | Path | None = None) -> Path:
-        """Write a self-contained HTML report; see `walkers.sweeps.report.report_sweep`."""
-        return report_sweep(self.directory, _path(to))
+        """Write a self-contained HTML report, by default ``report.html`` in the sweep's directory."""
+        return report_sweep(self._table, _path(to) or self.directory / REPORT_NAME)
 
     def export(self, form: Export = "archive", to: str | Path | None = None, **options: Any) -> Path:
         """Write the sweep and its runs as an ``archive``, the only form; see `Run.export`."""
@@ -501,7 +521,7 @@ class Sweep:
         return write_archive(self.directory, _path(to), **options)
 
 
-def _figure(table: pd.DataFrame, options: Mapping[str, Any]) -> Figure:
+def _figure(table: of_points.SweepTable, options: Mapping[str, Any]) -> Figure:
     from walkers.theory.prediction import predicted_column
 
     chosen = FigureOptions(**options)
@@ -619,17 +639,20 @@ def climb(
     climbs, runs = [], []
     for run_or_sweep in apply_all(lambda name: load(name, out, changes), references):
         directory = run_or_sweep.directory
-        conditions = iter([("", [directory])])
         if isinstance(run_or_sweep, Sweep):
-            frame = run_or_sweep.table()
-            conditions, left = conditions_in(frame), int((frame["status"] != "finished").sum())
+            table = run_or_sweep._table
+            left = len(table.frame) - len(table.finished)
             if left:
-                text = f"{left} of {len(frame)} points are not finished and left out"
+                text = f"{left} of {len(table.frame)} points are not finished and left out"
                 warnings.warn(f"{directory.name}: {text}", stacklevel=2)
-        for label, paths in conditions:
-            words = [directory.name] * (len(references) > 1 or not label) + [label] * bool(label)
-            climbs.append(summarise_climbs(paths, within) | {"condition": ", ".join(words)})
-            runs += [path.name for path in paths]
+            conditions = [(label, table.results_of(rows)) for label, rows in conditions_in(table.frame)]
+        else:
+            conditions = [("", [results.read(directory)])]
+        for label, of_piles in conditions:
+            words = [directory.name] if len(references) > 1 or not label else []
+            words += [label] if label else []
+            climbs.append(summarise_climbs(of_piles, within) | {"condition": ", ".join(words)})
+            runs += [result.directory.name for result in of_piles]
     if to is not None:
         write_climbs(climbs, runs, Path(to))
     return climbs

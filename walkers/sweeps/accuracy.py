@@ -26,7 +26,7 @@ from walkers.progress import Tell
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import case_of, recomputed, run_place
 from walkers.sweeps.scheduler import Options, SweepStopped, run_sweep
-from walkers.sweeps.table import SIDES, load, main_columns, sides_differ
+from walkers.sweeps.table import SIDES, main_columns, sides_differ, table_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,7 +73,7 @@ def measure_accuracy(
         record, failures = run_sweep(sweep, directory.parent, options, engine=engine, on_progress=on_progress)
         if failures:
             raise SweepStopped(f"{failures[0].run}: {failures[0].message}")
-        table = load(record.directory)
+        table = table_of(record).frame
         # The largest share of a headline velocity that the last increase of the modulus changes.
         names = {main_columns(table)[0], *(SIDES if case.goes_uphill or sides_differ(table) else ())}
         harder = [numbers, *table[1:].to_dict("records")]

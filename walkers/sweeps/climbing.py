@@ -21,7 +21,7 @@ import numpy as np
 from walkers.arrays import FloatArray
 from walkers.errors import refused
 from walkers.files import write_bytes
-from walkers.postprocess.measure.results import plain, read
+from walkers.postprocess.measure.results import Results, plain
 from walkers.postprocess.measure.uncertainty import guesses
 from walkers.postprocess.show.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, save_figure, styled
 from walkers.rounding import percent
@@ -46,8 +46,8 @@ _KINDS = {"all": ("", "ko"), "plain walls": ("on_plain_walls", "C1s"), "corners"
 """All climbs and their parts: key of `summarise_climbs`, colour and marker."""
 
 
-def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, list[Path]]]:
-    """The finished runs of piles in a sweep's table by conditions, groups that differ in nothing but their seeds.
+def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
+    """The finished points in a sweep's table by conditions, groups that differ in nothing but their seeds.
 
     Each has its varied values, such as ``drive.frequency = 100 Hz``, without those that at least half of the conditions
     have; empty for the usual condition.
@@ -63,25 +63,24 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, list[Path]]]:
     usual = {key: values for key, values in most.items() if 2 * (texts[key] == values[0]).sum() >= len(texts)}
     for rows, values in zip(sets, texts.to_dict("records") or [{}], strict=True):
         unusual = [f"{key} = {text}" for key, text in values.items() if [text] != usual.get(key)]
-        yield ", ".join(unusual), [*map(Path, dict.fromkeys(rows["run"]))]
+        yield ", ".join(unusual), rows
 
 
-def summarise_climbs(runs: Sequence[Path], within: float | None = None) -> dict[str, Any]:
-    """`summary` of the climbs in run directories of piles that differ only in their seed.
+def summarise_climbs(results: Sequence[Results], within: float | None = None) -> dict[str, Any]:
+    """`summary` of the climbs in runs of piles that differ only in their seed, by their results.
 
     ``each`` has all climbs as in the table ``clusters``, whenever they qualified, with the names of their runs;
     ``guessed`` are the values of the case that the program guessed, as texts.
     """
     import pandas as pd
 
-    results = [read(run) for run in runs]
-    for run, result in zip(runs, results, strict=True):
+    for result in results:
         if "climbs" not in result:
-            raise refused(run, "expected a finished run of a pile")
+            raise refused(result.directory, "expected a finished run of a pile")
     piles = pd.DataFrame([{name: result[name] for name in ("beads", "large", "driven")} for result in results])
     climbs = pd.concat([result.table("clusters").assign(pile=pile) for pile, result in enumerate(results)])
     climbs = climbs[climbs["climbed"].astype(bool)]
-    records: Any = climbs.assign(run=[runs[pile].name for pile in climbs["pile"]]).to_dict("records")
+    records: Any = climbs.assign(run=[results[pile].directory.name for pile in climbs["pile"]]).to_dict("records")
     guessed = guesses(results[0].about["rests_on"])
     return {**summary(piles, climbs, within), "each": list(map(plain, records)), "guessed": guessed}
 

@@ -24,7 +24,7 @@ from walkers.sweeps.figure_options import FigureOptions, Log
 from walkers.sweeps.layout import Layout, layout_of
 from walkers.sweeps.left_out import tell
 from walkers.sweeps.predictions import Predict, Theory
-from walkers.sweeps.table import FACING_DOWN, SEEDS, default_column, find_name
+from walkers.sweeps.table import FACING_DOWN, SEEDS, SweepTable, default_column, find_name
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,33 +47,54 @@ _LETTERS = 26  # letters of a line of a y label
 _FEW_TICKS = 6  # largest number of x values that all have ticks
 
 
-def figure_of(table: pd.DataFrame, options: FigureOptions = FigureOptions(), predict: Predict | None = None) -> Figure:
-    """Figure of the table of a sweep (`walkers.sweeps.table.load`), with the predictions of a theory if there is one.
+def figure_of(table: SweepTable, options: FigureOptions = FigureOptions(), predict: Predict | None = None) -> Figure:
+    """Figure of the table of a sweep, with the predictions of a theory if there is one.
 
-    Bars are the scatter over copies where the table has it. Without y, on slopes where the walkers that face up and
-    down differ, both are drawn. The axis of a key has the unit of the sweep file; other columns are in mm, mm/s, g
-    (9.8 m/s²) and degrees. A `LeftOutWarning` reports what is left out; `InputError` if no point is finished, or there
-    is no such column.
+    Bars are the scatter over copies where the table has it. Without y, on slopes where the walkers
+    that face up and down differ, both are drawn. The axis of a key has the unit of the sweep file;
+    other columns are in mm, mm/s, g (9.8 m/s²) and degrees. A `LeftOutWarning` reports what is left
+    out.
+
+    Parameters
+    ----------
+    table
+        The table of the sweep.
+    options
+        What is drawn, and where (`walkers.sweeps.layout.layout_of`).
+    predict
+        The predictions of models; None: no theory is drawn.
+
+    Raises
+    ------
+    InputError
+        If no point is finished, there is no such column, or keys would be hidden.
     """
     if options.log and options.log not in get_args(Log):
         raise refused("log", f"{options.log!r}: {expected_of(options.log, get_args(Log))}")
-    column = column_of(table, options.y)
-    done = table[table["status"] == "finished"]
-    counts = Counter(table["status"][table["status"] != "finished"])
-    unfinished = status_text(counts)
-    if done.empty:
-        raise refused(str(table.attrs["sweep"]), f"no point is finished ({unfinished or 'there is none'})")
-    if counts:
-        tell(f"{sum(counts.values())} of {len(table)} points left out: {unfinished}")
-    if empty := int(done[column].isna().sum()):
-        tell(f"{empty} of {len(done)} finished points have no {column}")
-    layout = layout_of(table, done, options)
+    frame = table.frame
+    column = column_of(frame, options.y)
+    done = table.finished
+    _tell_left_out(frame, done, column)
+    layout = layout_of(frame, done, options)
     if layout.hidden:
         tell(f"not distinguished: {'; '.join(factor.name for factor in layout.hidden)}")
     log = options.log or ""
-    theory = Theory.at_points(done, column, log, predict) if predict else None
+    theory = Theory.at_points(table, column, log, predict) if predict else None
     down = None if options.y else FACING_DOWN.get(column)
     return _draw(done, column, layout, theory, down=down, log=log)
+
+
+def _tell_left_out(frame: pd.DataFrame, done: pd.DataFrame, column: str) -> None:
+    """Warn about points that are not drawn; `InputError` if none is finished."""
+    counts = Counter(frame["status"][frame["status"] != "finished"])
+    unfinished = status_text(counts)
+    if done.empty:
+        raise refused(str(frame.attrs["sweep"]), f"no point is finished ({unfinished or 'there is none'})")
+    if counts:
+        tell(f"{counts.total()} of {len(frame)} points left out: {unfinished}")
+    empty = int(done[column].isna().sum())
+    if empty:
+        tell(f"{empty} of {len(done)} finished points have no {column}")
 
 
 def column_of(table: pd.DataFrame, name: str | None) -> str:

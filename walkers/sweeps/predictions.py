@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,9 +16,9 @@ from walkers.inputs.case_building import changed_case
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.quantities import unit_shown
 from walkers.postprocess.measure.results import derived
-from walkers.runner.directory import case_of
 from walkers.sweeps.factors import Factor
 from walkers.sweeps.left_out import tell
+from walkers.sweeps.table import SweepTable
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,9 +43,11 @@ class Theory:
     remarks: Collection[str]
 
     @classmethod
-    def at_points(cls, done: pd.DataFrame, column: str, log: str, predict: Predict) -> Theory | None:
-        """The theory of the points; None if it has no such number, which a warning says."""
-        cases, factor = [case_of(Path(run)) for run in done["run"]], factor_shown(done, column)
+    def at_points(cls, table: SweepTable, column: str, log: str, predict: Predict) -> Theory | None:
+        """The theory of the finished points; None if it has no such number, which a warning says."""
+        done = table.finished
+        cases = list(table.cases.values())
+        factor = factor_shown(done, column)
         predicted, remarks = predict(cases, column)
         for remark, number in remarks.items():
             tell(f"{number} of {len(done)} points: {remark}")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from walkers.errors import InputError
 from walkers.files import write_bytes
-from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.results import Results
 from walkers.postprocess.measure.uncertainty import lines_of_rest
 from walkers.postprocess.show.report.page import NAME, check_report, fill, page_of, svg_of
 from walkers.sweeps.factors import readable_key
@@ -17,26 +17,39 @@ from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.layout import NONE
 from walkers.sweeps.left_out import LeftOutWarning
-from walkers.sweeps.table import cells_of, load
-
-if TYPE_CHECKING:
-    import pandas as pd
+from walkers.sweeps.table import SweepTable, cells_of
 
 
-def report_sweep(directory: Path, to: Path | None = None) -> Path:
+def report_sweep(table: SweepTable, path: Path) -> Path:
     """Write the report of a sweep as one HTML file that needs no network.
 
-    Points link to the reports of their runs (`walkers.postprocess.show.report.run.report_run`) where these exist. The
-    default file is ``report.html`` in the sweep's directory.
+    Points link to the reports of their runs (`walkers.postprocess.show.report.run.report_run`)
+    where these exist.
+
+    Parameters
+    ----------
+    table
+        The table of the sweep.
+    path
+        The file to write.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the file is no HTML file in an existing folder.
     """
-    path = to or directory / NAME
     check_report(path)
-    frame = load(directory)
-    reports = (Path(run) / NAME for run in frame["run"])
-    links = [os.path.relpath(report, path.absolute().parent) if report.is_file() else "" for report in reports]
-    svg, left_out = _figure(frame)
-    results = [read(run) for run in frame.loc[frame["status"] == "finished", "run"]]
-    rests = {rest["key"]: rest for result in results for rest in result.about["rests_on"] if rest["key"] not in frame}
+    frame = table.frame
+    links = [_link(table.results.get(point), path) for point in frame["point"]]
+    svg, left_out = _figure(table)
+    rests: dict[str, dict[str, Any]] = {}
+    for result in table.results.values():
+        rests |= {rest["key"]: rest for rest in result.about["rests_on"] if rest["key"] not in frame}
     cells, same = cells_of(frame.drop(columns="run"), readable_key)
     body = fill(
         "sweep.html.j2",
@@ -54,12 +67,19 @@ def report_sweep(directory: Path, to: Path | None = None) -> Path:
     return path
 
 
-def _figure(frame: pd.DataFrame) -> tuple[str, list[str]]:
+def _link(result: Results | None, path: Path) -> str:
+    """The relative link from a page to the report of a run; empty if there is none."""
+    if result is None or not (result.directory / NAME).is_file():
+        return ""
+    return os.path.relpath(result.directory / NAME, path.absolute().parent)
+
+
+def _figure(table: SweepTable) -> tuple[str, list[str]]:
     """The figure as SVG, and the reasons why points are left out or look alike; no SVG if no point can be drawn."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LeftOutWarning)
         try:
-            svg = svg_of(figure_of(frame, FigureOptions(panels=NONE)))
+            svg = svg_of(figure_of(table, FigureOptions(panels=NONE)))
         except InputError as error:
             return "", [str(error)]
     return svg, [str(warning.message) for warning in caught]

@@ -19,7 +19,6 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.measure.numbers import MAIN
 from walkers.postprocess.measure.quantities import declared, unit_shown
-from walkers.postprocess.measure.results import read
 from walkers.postprocess.measure.sides import REST
 from walkers.postprocess.measure.uncertainty import SPREAD_NAME, few_draws, held_of, held_text, in_lines, spread_of
 from walkers.progress import Tell
@@ -30,8 +29,9 @@ from walkers.runs.case_text import kind_of
 from walkers.sweeps.correlations import rank_correlations
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.left_out import LeftOutWarning
+from walkers.sweeps.record import read_record
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
-from walkers.sweeps.table import load, main_columns, together
+from walkers.sweeps.table import main_columns, table_of, together
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -149,9 +149,9 @@ def run_spread(
     options = replace(options, dumps=False)
     draws = spread_sweep(case, points, engine)
     record, failures = run_sweep(draws, out, options, engine=engine, on_progress=on_progress)
-    table = load(record.directory)
-    warned = [read(run).warnings for run in table.loc[table["status"] == "finished", "run"]]
-    spread = replace(spread_in(table, case, record.directory, failures), doubts=[*filter(None, warned)])
+    table = table_of(record)
+    doubts = [result.warnings for result in table.results.values() if result.warnings]
+    spread = replace(spread_in(table.frame, case, record.directory, failures), doubts=doubts)
     write_json(record.directory / SPREAD_NAME, {**spread.as_dict(), "directory": record.directory.name})
     return spread
 
@@ -187,7 +187,7 @@ def figures_of_spread(run: Path) -> dict[str, Figure]:
     if (directory / SPREAD_NAME).is_file():
         with suppress(InputError), warnings.catch_warnings():
             warnings.simplefilter("ignore", LeftOutWarning)
-            return {"spread": figure_of(load(directory))}
+            return {"spread": figure_of(table_of(read_record(directory)))}
     return {}
 
 

@@ -11,8 +11,10 @@ from __future__ import annotations
 import io
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
 from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,18 +25,20 @@ from walkers.inputs.axes import ranges_of
 from walkers.inputs.origins import text_of
 from walkers.postprocess.measure.numbers import headline
 from walkers.postprocess.measure.quantities import ENDS, GROUPS, described_columns, is_declared, unit_shown
-from walkers.postprocess.measure.results import modules_of
+from walkers.postprocess.measure.results import Results, modules_of
 from walkers.postprocess.measure.sides import SEPARATED
 from walkers.rounding import counted, rounded
+from walkers.runner.directory import case_of
 from walkers.runs.case_text import short_keys
 from walkers.runs.status import PointState, status_text
-from walkers.sweeps.record import read_record, states
+from walkers.sweeps.record import SweepRecord, read_record, states
 from walkers.text import aligned, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from walkers.inputs.sweep import Sweep
+    from walkers.inputs.tables.case import Case
 
 STATE = {
     "status": ("", "finished, failed, running or missing"),
@@ -63,16 +67,68 @@ _ASIDE = ("lost", "reason", "message")
 _MOST_FAILURES = 10
 
 
-def load(directory: str | Path) -> pd.DataFrame:
-    """The table of a sweep in a directory such as ``runs/fig2``; `InputError` if there is no sweep.
+@dataclass(frozen=True)
+class SweepTable:
+    """The table of a sweep with the results of its finished points, all read once.
 
-    Columns are ``point``, the keys that vary (in the unit of the sweep file), and in SI units the numbers of results
-    (NaN for unfinished points) and `STATE`.
+    Attributes
+    ----------
+    frame
+        One row per point, as from `load`.
+    results
+        Results of the finished points by their numbers.
     """
+
+    frame: pd.DataFrame
+    results: Mapping[int, Results] = field(default_factory=dict)
+
+    @property
+    def finished(self) -> pd.DataFrame:
+        """The rows of the finished points."""
+        return self.frame[self.frame["status"] == "finished"]
+
+    @cached_property
+    def cases(self) -> Mapping[int, Case]:
+        """Cases of the finished points by their numbers, as their runs have recorded them.
+
+        To expand the record again would take three times as long, and it would give the values of
+        today's library.
+        """
+        return {point: case_of(result.directory) for point, result in self.results.items()}
+
+    def results_of(self, rows: pd.DataFrame) -> list[Results]:
+        """The results of some rows of the table, once for each run."""
+        results = {self.results[point].directory: self.results[point] for point in rows["point"]}
+        return list(results.values())
+
+
+def load(directory: str | Path) -> pd.DataFrame:
+    """The table of a sweep in a directory such as ``runs/fig2``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns are ``point``, the keys that vary (in the unit of the sweep file), and in SI units
+        the numbers of results (NaN for unfinished points) and `STATE`.
+
+    Raises
+    ------
+    InputError
+        If there is no sweep.
+    """
+    return table_of(read_record(directory)).frame
+
+
+def table_of(record: SweepRecord) -> SweepTable:
+    """The table of a sweep with its results, by its record."""
+    points = states(record, results=True)
+    results = {number: state.result for number, state in enumerate(points) if state.result is not None}
+    return SweepTable(_frame(record.sweep, points), results)
+
+
+def _frame(sweep: Sweep, points: Sequence[PointState]) -> pd.DataFrame:
     import pandas as pd
 
-    record = read_record(directory)
-    sweep, points = record.sweep, states(record, results=True)
     varied: dict[str, tuple[str, str]] = {}
     for key, unit, values in zip(sweep.keys, sweep.units.values(), zip(*sweep.values, strict=True), strict=True):
         # A key with several numbers, such as the radii, has a column for each.
