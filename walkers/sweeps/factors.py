@@ -16,7 +16,8 @@ from walkers.text import with_unit
 if TYPE_CHECKING:
     import pandas as pd
 
-_ROUNDING = 1e-12  # relative to the largest number
+ROUNDING = 1e-12
+"""Share of the largest number below which a number is a rounding error."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class Factor:
 
     def exact(self, level: float) -> float:
         """A number, or zero if it is a rounding error."""
-        return 0.0 if abs(level) < _ROUNDING * max(map(abs, self.levels)) else level
+        return 0.0 if abs(level) < ROUNDING * max(map(abs, self.levels)) else level
 
     def text(self, level: Any, *, by_name: bool = False) -> str:
         """A level as text with its unit, for numbers optionally with the factor's name."""

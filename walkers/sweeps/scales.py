@@ -1,0 +1,139 @@
+"""Scales, ranges and ticks of the axes of a sweep's figure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from walkers.arrays import FloatArray
+from walkers.postprocess.show.drawing import plain_text
+from walkers.sweeps.factors import ROUNDING, Factor
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+_FEW_TICKS = 6
+"""Largest number of x values that all have ticks."""
+_TICK_DISTANCE = 0.08
+"""Smallest distance of such values, relative to the range."""
+_MOST_LETTERS = 40
+"""Largest number of letters of all categories on an x axis; names of more letters are slanted."""
+_MARGIN = 0.06
+"""Free space above and below the points, relative to their range."""
+_LEAST_RANGE = 1e-4
+"""Smallest range of the y axis relative to the mean, so that rounding errors are not shown."""
+
+
+def scale_x(axes: Axes, x: Factor, log: str) -> None:
+    """Set scale and ticks of the x axis; it is logarithmic for an ``x`` in ``log`` and for log-uniform samples."""
+    if not x.is_number:
+        _name_categories(axes, x)
+        return
+    is_log = x.is_log or "x" in log
+    if is_log:
+        axes.set_xscale("log")
+    if _has_few_values(x):
+        axes.set_xticks(x.levels, [f"{x.exact(level):.4g}" for level in x.levels])
+        axes.set_xticks([], minor=True)
+    elif x.is_log:
+        _tick_decades(axes, x)
+    elif not is_log:
+        _tick_linear(axes, x)
+
+
+def _name_categories(axes: Axes, x: Factor) -> None:
+    slanted: dict[str, Any] = {}
+    if sum(len(level) for level in x.levels) > _MOST_LETTERS:
+        slanted = {"rotation": 35, "ha": "right", "rotation_mode": "anchor"}
+    axes.set_xticks(range(len(x.levels)), [plain_text(level) for level in x.levels], **slanted)
+    axes.set_xlim(-0.6, len(x.levels) - 0.4)
+
+
+def _has_few_values(x: Factor) -> bool:
+    """Whether each value has a tick: there are few, and they are not too close."""
+    distances = np.diff(x.levels)
+    least = _TICK_DISTANCE * (x.levels[-1] - x.levels[0])
+    return len(x.levels) <= _FEW_TICKS and bool(np.all(distances > least)) and not x.is_sample
+
+
+def _tick_decades(axes: Axes, x: Factor) -> None:
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    ticks: tuple[float, ...] = (1.0,)
+    if x.levels[-1] < 40.0 * x.levels[0]:
+        ticks = (1.0, 2.0, 5.0)
+    axes.xaxis.set_major_locator(LogLocator(subs=ticks))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _tick_linear(axes: Axes, x: Factor) -> None:
+    """Ticks at round numbers; in the narrow panels of samples few, because long numbers would overlap."""
+    from matplotlib.ticker import MaxNLocator
+
+    integer = all(float(level).is_integer() for level in x.levels)
+    locator = MaxNLocator("auto", steps=[1, 2, 5, 10], integer=integer)
+    if x.is_sample:
+        locator.set_params(nbins=4)
+    axes.xaxis.set_major_locator(locator)
+
+
+def scale_y(axes: Axes, points: pd.DataFrame, models: Sequence[FloatArray], log: str) -> None:
+    """Set scale and range of the y axis.
+
+    The range has the points, their error bars and bands, and the first model, with margins; of
+    each other model at least one point.
+
+    Parameters
+    ----------
+    axes
+        Axes with which all panels share their y axis.
+    points
+        Columns ``value`` and ``error``, and optionally ``down``, ``low`` and ``high``.
+    models
+        Predictions for the points, shape (N,) each.
+    log
+        Letters of logarithmic axes.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    if "y" in log:
+        axes.set_yscale("log", nonpositive="mask")
+        return
+    low, high = _range_of(points, models)
+    if (points["value"].dropna() % 1.0 == 0.0).all():  # counts
+        axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+        low -= 0.5
+        high += 0.5
+    low, high = _widened(low, high)
+    margin = _MARGIN * (high - low)
+    axes.set_ylim(low - margin, high + margin)
+
+
+def _range_of(points: pd.DataFrame, models: Sequence[FloatArray]) -> tuple[float, float]:
+    """Smallest and largest number to show."""
+    errors = points["error"].fillna(0.0)
+    ends = points.filter(["down", "low", "high"]).to_numpy().ravel()
+    shown = np.concatenate([points["value"] - errors, points["value"] + errors, *models[:1], ends])
+    low = float(np.nanmin(shown))
+    high = float(np.nanmax(shown))
+    for model in models[1:]:
+        finite = model[np.isfinite(model)]
+        if len(finite):
+            low = min(low, float(finite.max()))
+            high = max(high, float(finite.min()))
+    return low, high
+
+
+def _widened(low: float, high: float) -> tuple[float, float]:
+    """A range that is not as narrow as rounding errors."""
+    middle = (low + high) / 2.0
+    if high - low > _LEAST_RANGE * abs(middle) and high - low >= ROUNDING:
+        return low, high
+    half = 1.0
+    if abs(middle) > ROUNDING:
+        half = 0.05 * abs(middle)
+    return middle - half, middle + half
