@@ -25,14 +25,33 @@ if TYPE_CHECKING:
 
 Predict = Callable[[Sequence[Case], str], tuple[Mapping[str, FloatArray], Mapping[str, int]]]
 """Function of N cases and a column: predictions of models, SI units, shape (N,); remarks, with the number of cases."""
-_CURVE = 61  # points of a model's curve
+_CURVE_POINTS = 61
+"""Number of points of a model's curve."""
 _OF_SHAPE = ("radii", "volume_fraction", "meniscus_radius", "contact_angle")
 """Ends of the keys that change the shape of bridges, each of which takes a tenth of a second to solve."""
 
 
 @dataclass(frozen=True)
 class Theory:
-    """Predictions of models for the cases of the points (``values``, in the displayed unit), and between them."""
+    """Predictions of models for the finished points of a sweep.
+
+    Attributes
+    ----------
+    predict
+        The function that predicts.
+    done
+        Rows of the finished points.
+    column
+        The predicted column.
+    log
+        Letters of logarithmic axes.
+    cases
+        The cases of the points.
+    values
+        The predictions for the points by the names of the models, in the displayed unit.
+    remarks
+        Reasons why a model does not apply to points.
+    """
 
     predict: Predict
     done: pd.DataFrame
@@ -47,50 +66,84 @@ class Theory:
         """The theory of the finished points; None if it has no such number, which a warning says."""
         done = table.finished
         cases = list(table.cases.values())
-        factor = factor_shown(done, column)
         predicted, remarks = predict(cases, column)
         for remark, number in remarks.items():
             tell(f"{number} of {len(done)} points: {remark}")
-        values = {model: factor * values for model, values in predicted.items()}
-        return cls(predict, done, column, log, cases, values, remarks.keys()) if values else None
+        if not predicted:
+            return None
+        values = _shown(done, column, predicted)
+        return cls(predict, done, column, log, cases, values, remarks.keys())
 
     def curves(
-        self, rows: npt.NDArray[np.int64], at: FloatArray, x: Factor | None
+        self, rows: npt.NDArray[np.int64], places: FloatArray, x: Factor | None
     ) -> tuple[FloatArray, Mapping[str, FloatArray]]:
-        """Places on the x axis and predictions there: those of the points, which are ``at`` these places.
+        """Predictions along the x axis: a fine curve if the points differ in one number, else those of the points.
 
-        A fine curve instead for an axis ``x`` along which the points differ in one number. If x is no key, such as Γ0,
-        the key that varies is changed.
+        Parameters
+        ----------
+        rows
+            Numbers of the points, in the order of their places.
+        places
+            Their places on the x axis.
+        x
+            The factor on the x axis; None if no line joins the points. If it is no key, such as Γ0,
+            the key that varies is changed.
+
+        Returns
+        -------
+        along : ndarray
+            Places on the x axis.
+        values : mapping
+            Predictions there by the names of the models, in the displayed unit.
         """
-        points, case = self.done.iloc[rows], self.cases[rows[0]]
-        of_points = at, {model: values[rows] for model, values in self.values.items()}
-        moving = [key for key in self.done.attrs["varied"] if points[key].nunique() > 1]
-        if x is None or len(moving) != 1 or not (x.keys[0] in moving or x.keys[0] in derived(case)):
+        of_points = places, {model: values[rows] for model, values in self.values.items()}
+        key = None if x is None else self._key_along(rows, x)
+        if x is None or key is None:
             return of_points
-        key, name = moving[0], x.keys[0]
-        if key.endswith(_OF_SHAPE) or points[key].dtype.kind not in "if":
-            return of_points
-        low, high = float(points[key].min()), float(points[key].max())
-        spacing = np.geomspace if "x" in self.log and low > 0.0 else np.linspace
-        numbers = spacing(low, high, _CURVE).tolist()
-        unit = self.done.attrs["units"][key] or ""
-        cases = [(low, _with_number(case, key, low, unit))]
-        for value in numbers[1:-1]:
-            # Between two points there may be values that no case has, such as half an integer.
-            with suppress(InputError):
-                cases.append((value, _with_number(case, key, value, unit)))
-        cases.append((high, _with_number(case, key, high, unit)))
-        predicted, remarks = self.predict([moved for _, moved in cases], self.column)
+        numbers, cases = self._cases_along(rows, key)
+        predicted, remarks = self.predict(cases, self.column)
         if predicted.keys() != self.values.keys():
             return of_points
         if not all(np.isfinite(values).all() for values in predicted.values()):
             for remark in remarks.keys() - self.remarks:
                 tell(f"the theory's curve has gaps: {remark}")
-        along = [
-            value if name == key else factor_shown(self.done, name) * derived(moved)[name] for value, moved in cases
-        ]
-        factor = factor_shown(self.done, self.column)
-        return np.array(along), {model: factor * values for model, values in predicted.items()}
+        along = numbers
+        name = x.keys[0]
+        if name != key:
+            along = [factor_shown(self.done, name) * derived(case)[name] for case in cases]
+        return np.array(along), _shown(self.done, self.column, predicted)
+
+    def _key_along(self, rows: npt.NDArray[np.int64], x: Factor) -> str | None:
+        """The key that varies along an axis; None if points differ in several keys, or a curve would take long."""
+        points = self.done.iloc[rows]
+        varied = [key for key in self.done.attrs["varied"] if points[key].nunique() > 1]
+        if len(varied) != 1:
+            return None
+        key = varied[0]
+        if x.keys[0] != key and x.keys[0] not in derived(self.cases[rows[0]]):
+            return None
+        if key.endswith(_OF_SHAPE) or points[key].dtype.kind not in "if":
+            return None
+        return key
+
+    def _cases_along(self, rows: npt.NDArray[np.int64], key: str) -> tuple[list[float], list[Case]]:
+        """Numbers of a key between the smallest and the largest of some points, and the cases with these numbers."""
+        low = float(self.done.iloc[rows][key].min())
+        high = float(self.done.iloc[rows][key].max())
+        spacing = np.geomspace if "x" in self.log and low > 0.0 else np.linspace
+        between = spacing(low, high, _CURVE_POINTS).tolist()[1:-1]
+        unit = self.done.attrs["units"][key] or ""
+        first = self.cases[rows[0]]
+        numbers = [low]
+        cases = [_with_number(first, key, low, unit)]
+        for number in between:
+            # Between two points there may be numbers that no case has, such as half an integer.
+            with suppress(InputError):
+                cases.append(_with_number(first, key, number, unit))
+                numbers.append(number)
+        numbers.append(high)
+        cases.append(_with_number(first, key, high, unit))
+        return numbers, cases
 
 
 def _with_number(case: Case, key: str, value: float, unit: str) -> Case:
@@ -98,6 +151,12 @@ def _with_number(case: Case, key: str, value: float, unit: str) -> Case:
     if unit:
         return changed_case(case, {key: f"{value!r} {unit}"})
     return changed_case(case, {key: int(value) if value.is_integer() else value})
+
+
+def _shown(done: pd.DataFrame, column: str, predicted: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Predictions in the displayed unit of a column."""
+    factor = factor_shown(done, column)
+    return {model: factor * values for model, values in predicted.items()}
 
 
 def factor_shown(done: pd.DataFrame, column: str) -> float:
