@@ -119,7 +119,7 @@ class Theory:
         varied = [key for key in self.done.attrs["varied"] if points[key].nunique() > 1]
         if len(varied) != 1:
             return None
-        key = varied[0]
+        key: str = varied[0]
         if x.keys[0] != key and x.keys[0] not in derived(self.cases[rows[0]]):
             return None
         if key.endswith(_OF_SHAPE) or points[key].dtype.kind not in "if":

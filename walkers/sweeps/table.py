@@ -127,24 +127,49 @@ def table_of(record: SweepRecord) -> SweepTable:
 
 
 def _frame(sweep: Sweep, points: Sequence[PointState]) -> pd.DataFrame:
+    """The data frame of a sweep, with descriptions of its columns and of the sweep."""
     import pandas as pd
 
-    varied: dict[str, tuple[str, str]] = {}
-    for key, unit, values in zip(sweep.keys, sweep.units.values(), zip(*sweep.values, strict=True), strict=True):
-        # A key with several numbers, such as the radii, has a column for each.
-        parts = max((len(value) for value in values if isinstance(value, list)), default=0)
-        varied |= dict.fromkeys([f"{key}[{part}]" for part in range(parts)] or [key], (unit or "", "varied"))
-    numbers = {name for point in points for name in point.result or _declared(sweep)}
-    described = {"point": ("", "number of the point"), **varied, **described_columns(numbers), **STATE}
+    varied = _varied_columns(sweep)
+    numbers: set[str] = set()
+    for point in points:
+        numbers.update(point.result or ())
+    if not all(point.result for point in points):
+        numbers.update(_declared(sweep))
+    described = {
+        "point": ("", "number of the point"),
+        **varied,
+        **described_columns(numbers),
+        **STATE,
+    }
     rows = [_row(number, sweep, state) for number, state in enumerate(points)]
     frame = pd.DataFrame(rows, columns=list(described))
     frame.attrs["units"] = {name: unit for name, (unit, _) in described.items()}
     frame.attrs["meanings"] = {name: meaning for name, (_, meaning) in described.items()}
-    frame.attrs |= {"sweep": sweep.name, "title": sweep.title or sweep.name, "until_below": sweep.until_below}
-    frame.attrs |= {"varied": list(varied), "axes": [axis.keys for axis in sweep.axes]}
-    samples = [ranges_of(sample["ranges"]) for sample in sweep.file.get("sample", [])]
-    frame.attrs["sampled"] = {key: span.logarithmic for ranges in samples for key, span in ranges.items()}
+    frame.attrs["sweep"] = sweep.name
+    frame.attrs["title"] = sweep.title or sweep.name
+    frame.attrs["until_below"] = sweep.until_below
+    frame.attrs["varied"] = list(varied)
+    frame.attrs["axes"] = [axis.keys for axis in sweep.axes]
+    frame.attrs["sampled"] = {}
+    for sample in sweep.file.get("sample", []):
+        for key, span in ranges_of(sample["ranges"]).items():
+            frame.attrs["sampled"][key] = span.logarithmic
     return frame
+
+
+def _varied_columns(sweep: Sweep) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of the columns of the varied keys; a key with several numbers has a column for each."""
+    columns = {}
+    values_of = zip(*sweep.values, strict=True)
+    for (key, unit), values in zip(sweep.units.items(), values_of, strict=True):
+        parts = max((len(value) for value in values if isinstance(value, list)), default=0)
+        names = [key]
+        if parts:
+            names = [f"{key}[{part}]" for part in range(parts)]
+        for name in names:
+            columns[name] = (unit or "", "varied")
+    return columns
 
 
 def _declared(sweep: Sweep) -> list[str]:
