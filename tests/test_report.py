@@ -144,6 +144,15 @@ def test_a_sweeps_report_has_its_figure_and_table_and_links_to_the_reports_of_it
     assert (page.carried, page.scripts) == ({}, [])
 
 
+def test_the_report_of_a_sweep_of_three_keys_draws_the_values_of_the_last_alike_and_says_so(
+    looked_through: Path, tmp_path: Path
+) -> None:
+    page = Report(walkers.load(looked_through / "three").report(tmp_path / "report.html"))
+    assert "not distinguished: frequency" in page.words
+    assert page.text.count("<svg") == 1
+    assert page.text.count('<tr><th scope="row">') == 12
+
+
 def test_a_reports_figures_are_those_that_are_plotted_and_fewer_frames_make_it_smaller(
     walked_run: Path, walked_report: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
