@@ -51,8 +51,8 @@ def figure_of(table: SweepTable, options: FigureOptions = FigureOptions(), predi
 
     Bars are the scatter over copies where the table has it. Without y, on slopes where the walkers
     that face up and down differ, both are drawn. The axis of a key has the unit of the sweep file;
-    other columns are in mm, mm/s, g (9.8 m/s²) and degrees. A `LeftOutWarning` reports what is left
-    out.
+    other columns are in mm, mm/s, g (9.8 m/s²) and degrees. What is left out is reported by
+    `walkers.sweeps.left_out.LeftOutWarning`.
 
     Parameters
     ----------
