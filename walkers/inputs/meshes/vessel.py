@@ -21,10 +21,10 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.arrays import FloatArray, IntArray, Vector
+from walkers.inputs.meshes.facet import Facet, Half
 from walkers.inputs.meshes.flat_faces import FlatFaces
 from walkers.inputs.meshes.triangles import SAME_POINT, evaluated, groups_of, signed_distance, within_polygon
 from walkers.inputs.meshes.wall_names import names_of_faces, numbered, span_text
-from walkers.inputs.tables.shapes.walls import Facet, Half
 
 if TYPE_CHECKING:
     import pyvista as pv

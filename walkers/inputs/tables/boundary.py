@@ -1,4 +1,4 @@
-"""``[boundary]`` of a case file. What a shape is and does stands in `walkers.inputs.tables.shapes`."""
+"""``[boundary]`` of a case file; what a shape is and does is in `walkers.inputs.tables.shapes`."""
 
 from __future__ import annotations
 
@@ -121,15 +121,22 @@ class Boundary(Table):
         return (-down * _round(cos(self.uphill)), -down * _round(sin(self.uphill)), -press)
 
     def damping(self, radius: float) -> float:
-        """Damping of a bead by all walls that it touches at once over that by one (`Shape.damping`)."""
+        """Damping of a bead by the walls that it touches over that by one (`Shape.damping`)."""
         return self.geometry.damping(radius)
 
-    def room(self, half_x: float, half_y: float, height: float, margin: float, largest: float) -> tuple[Vector, Vector]:
+    def room(
+        self,
+        half_x: float,
+        half_y: float,
+        height: float,
+        margin: float,
+        largest: float,
+    ) -> tuple[Vector, Vector]:
         """Corners of the simulation box, m (`Shape.room`)."""
         return self.geometry.room(half_x, half_y, height, margin, largest)
 
     def side_clearance(self, places: FloatArray) -> FloatArray:
-        """Distance of places, (n, 3), from the nearest side wall, (n,), m (`Shape.side_clearance`)."""
+        """Distance of places (n, 3) from the nearest side wall, (n,), m (`Shape.side_clearance`)."""
         return self.geometry.side_clearance(places)
 
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
@@ -150,7 +157,7 @@ class Boundary(Table):
         return self.geometry.volume(level)
 
     def layers(self, largest: float, floor: float) -> Iterator[Layer]:
-        """Layers of places from which beads up to a radius (m) are poured above a height (m) (`Shape.layers`)."""
+        """Layers of places from which beads up to a radius are poured above a height, m."""
         return self.geometry.layers(largest, floor)
 
 
@@ -160,5 +167,5 @@ def _geometry_of(boundary: Boundary) -> Shape:
 
 
 def _round(value: float) -> float:
-    """A value, or zero if it differs from zero by rounding only: gravity along a wall has no normal component."""
+    """A value, or zero if only rounding makes it differ: gravity along a wall has no normal part."""
     return 0.0 if abs(value) < _LEAST else value

@@ -19,7 +19,7 @@ NEAREST = (1.0 - 1e-9) * LOOSE
 _RIM = 2e-4
 """m; the simulation box reaches this far beyond the walls."""
 _BEYOND = 1.01
-"""Extent of a container in pictures over its width: the edges of the prism of a cylinder lie beyond the wall."""
+"""Extent of pictures over the width: the edges of the prism of a cylinder lie beyond the wall."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,14 @@ class Container(Shape):
         """See `Shape.damping`; a bead as wide as the container touches two opposite sides."""
         return damping_between(self.width, radius)
 
-    def room(self, half_x: float, half_y: float, height: float, margin: float, largest: float) -> tuple[Vector, Vector]:  # noqa: ARG002
+    def room(
+        self,
+        half_x: float,  # noqa: ARG002
+        half_y: float,  # noqa: ARG002
+        height: float,  # noqa: ARG002
+        margin: float,  # noqa: ARG002
+        largest: float,
+    ) -> tuple[Vector, Vector]:
         """The simulation box (see `Shape.room`): the container and as much room above it."""
         half = self.width / 2.0 + _RIM
         return (-half, -half, -4.0 * largest), (half, half, 2.0 * self.height)
@@ -62,13 +69,14 @@ class Container(Shape):
         return super().outline(low, high, inside)
 
     def layer(self, largest: float) -> Layer:
-        """Places from which beads up to a radius (m) are poured: a square lattice, without those that walls cut."""
+        """A square lattice of places for beads up to a radius (m), without those that walls cut."""
         across = int(self.width / (2.0 * LOOSE * largest))
         pitch = self.width / max(across, 1)
         line = [(index + 0.5) * pitch - self.width / 2.0 for index in range(across)]
         square = [(x, y) for x in line for y in line]
         clearances = self.side_clearance(np.array([(x, y, 0.0) for x, y in square]).reshape(-1, 3))
-        places = [place for place, clear in zip(square, clearances, strict=True) if clear > NEAREST * largest]
+        free = clearances > NEAREST * largest
+        places = [place for place, is_free in zip(square, free, strict=True) if is_free]
         return Layer(places, pitch, self.tight)
 
     def layers(self, largest: float, floor: float) -> Iterator[Layer]:  # noqa: ARG002
@@ -79,14 +87,16 @@ class Container(Shape):
             yield layer._replace(level=(number + 0.5) * 2.0 * LOOSE * largest)
 
     def check_pour(self, count: int, largest: float, floor: float) -> None:
-        """Raise `InputError` unless a number of beads up to a radius (m) can be poured above a height (m)."""
+        """Raise `InputError` unless the beads fit (see `Shape.check_pour`)."""
         if self.width < 4.0 * largest:
-            raise unusable("boundary.width", "expected at least two of the large beads side by side")
+            expected = "expected at least two of the large beads side by side"
+            raise unusable("boundary.width", expected)
         layer = self.layer(largest)
         if layer.tight and self.width < 8.0 * largest:
-            raise unusable("boundary.width", "expected at least four of the large beads side by side")
+            expected = "expected at least four of the large beads side by side"
+            raise unusable("boundary.width", expected)
         layers = -(-count // len(layer.places)) if layer.places else inf
         level = floor + layers * 2.0 * LOOSE * largest
         if level > 2.0 * self.height:  # walls and simulation go on to there
-            needed = f"{level / 2.0 * 1e3:.3g} mm"
-            raise unusable("boundary.height", f"too low for {count} beads; expected {needed} or more")
+            needed = f"expected {level / 2.0 * 1e3:.3g} mm or more"
+            raise unusable("boundary.height", f"too low for {count} beads; {needed}")

@@ -24,7 +24,9 @@ class GrooveShape(Shape):
     def walls(self) -> tuple[Wall, ...]:
         """The two walls, neither of which is a floor."""
         across, up = cos(self.opening / 2.0), sin(self.opening / 2.0)
-        return Flat(BOTTOM.point, (0.0, across, up), "-y"), Flat(BOTTOM.point, (0.0, -across, up), "+y")
+        right = Flat(BOTTOM.point, (0.0, across, up), "-y")
+        left = Flat(BOTTOM.point, (0.0, -across, up), "+y")
+        return right, left
 
     def damping(self, radius: float) -> float:  # noqa: ARG002
         """See `Shape.damping`; each bead touches both walls."""

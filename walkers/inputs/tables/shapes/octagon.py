@@ -12,13 +12,18 @@ from walkers.inputs.tables.shapes.shape import upright_walls
 from walkers.inputs.tables.shapes.walls import BOTTOM, Wall
 
 _CUT = sqrt(0.5)
-_CORNERS = {"+x+y": (-_CUT, -_CUT), "+x-y": (-_CUT, _CUT), "-x+y": (_CUT, -_CUT), "-x-y": (_CUT, _CUT)}
+_CORNERS = {
+    "+x+y": (-_CUT, -_CUT),
+    "+x-y": (-_CUT, _CUT),
+    "-x+y": (_CUT, -_CUT),
+    "-x-y": (_CUT, _CUT),
+}
 """x and y of the normals of the sides across the corners of a box."""
 
 
 @dataclass(frozen=True)
 class OctagonShape(Container):
-    """A container whose cross-section is a regular octagon; ``width`` (m) is the distance of opposite sides."""
+    """A container with eight sides; ``width`` (m) is the distance of opposite ones."""
 
     name: ClassVar[str] = "octagon"
     area: ClassVar[float] = 2.0 * (sqrt(2.0) - 1.0)

@@ -10,7 +10,12 @@ from walkers.arrays import FloatArray
 from walkers.inputs.tables.shapes.walls import Wall
 
 
-def faces_within(walls: Sequence[Wall], low: FloatArray, high: FloatArray, inside: FloatArray) -> list[FloatArray]:
+def faces_within(
+    walls: Sequence[Wall],
+    low: FloatArray,
+    high: FloatArray,
+    inside: FloatArray,
+) -> list[FloatArray]:
     """The parts of walls that bound the convex room around a place.
 
     Parameters

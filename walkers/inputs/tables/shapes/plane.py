@@ -22,7 +22,14 @@ class PlaneShape(Shape):
         """The floor."""
         return (BOTTOM,)
 
-    def room(self, half_x: float, half_y: float, height: float, margin: float, largest: float) -> tuple[Vector, Vector]:
+    def room(
+        self,
+        half_x: float,
+        half_y: float,
+        height: float,
+        margin: float,
+        largest: float,
+    ) -> tuple[Vector, Vector]:
         """The simulation box (see `Shape.room`), which reaches one margin below the floor."""
         (x, y, _), high = super().room(half_x, half_y, height, margin, largest)
         return (x, y, -margin), high

@@ -1,4 +1,4 @@
-"""The shapes that a case file can name. A new shape is a module beside this one and an entry here."""
+"""The shapes that a case file can name. A new one is a module in this folder and an entry here."""
 
 from __future__ import annotations
 
@@ -14,10 +14,16 @@ from walkers.inputs.tables.shapes.plane import PlaneShape
 from walkers.inputs.tables.shapes.shape import Shape
 from walkers.inputs.tables.shapes.vessel import VesselShape
 
-SHAPES: Mapping[str, type[Shape]] = {
-    shape.name: shape
-    for shape in (PlaneShape, ChannelShape, GrooveShape, BoxShape, CylinderShape, OctagonShape, VesselShape)
-}
+_CLASSES: tuple[type[Shape], ...] = (
+    PlaneShape,
+    ChannelShape,
+    GrooveShape,
+    BoxShape,
+    CylinderShape,
+    OctagonShape,
+    VesselShape,
+)
+SHAPES: Mapping[str, type[Shape]] = {shape.name: shape for shape in _CLASSES}
 """The classes of shapes by their names."""
 
 if TYPE_CHECKING:

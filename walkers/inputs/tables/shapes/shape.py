@@ -1,6 +1,6 @@
 """What a boundary asks its shape: the base of all shapes.
 
-Each shape is a module beside this one: its sizes, its walls, and what follows from them. Units are SI.
+Each shape is a module in this folder: its sizes, walls, and what follows from them. SI units.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Layer(NamedTuple):
     level: float = 0.0
 
     def play(self, radius: float, largest: float) -> float:
-        """Largest displacement of a bead from its place, m, for its radius and that of the largest bead (m)."""
+        """Largest displacement of a bead from its place, m, for its radius and the largest, m."""
         return (LOOSE * largest - radius) / 2.0 if self.tight else self.pitch / 2.0 - radius
 
 
@@ -85,7 +85,7 @@ class Shape(ABC):
         return inf
 
     def damping(self, radius: float) -> float:  # noqa: ARG002
-        """Damping of a bead of a radius (m) by the walls that it touches at once, over that by one of them.
+        """Damping of a bead of a radius (m) by all walls that it touches, over that by one wall.
 
         It is the largest eigenvalue of the sum of n nᵀ over the normals n of these walls.
         """
@@ -115,16 +115,25 @@ class Shape(ABC):
         return clearances
 
     def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
-        """Places about the origin for a number of walkers that stand ``spacing`` apart, x and y in m."""
+        """Places about the origin for walkers that stand ``spacing`` apart, x and y in m."""
         columns = 1 if self.in_a_row else ceil(sqrt(number))
         rows = ceil(number / columns)
         places = []
         for place in range(number):
             row, column = divmod(place, columns)
-            places.append(((row - (rows - 1) / 2.0) * spacing, (column - (columns - 1) / 2.0) * spacing))
+            x = (row - (rows - 1) / 2.0) * spacing
+            y = (column - (columns - 1) / 2.0) * spacing
+            places.append((x, y))
         return places
 
-    def room(self, half_x: float, half_y: float, height: float, margin: float, largest: float) -> tuple[Vector, Vector]:
+    def room(
+        self,
+        half_x: float,
+        half_y: float,
+        height: float,
+        margin: float,
+        largest: float,
+    ) -> tuple[Vector, Vector]:
         """The simulation box.
 
         Parameters
@@ -164,23 +173,49 @@ class Shape(ABC):
         return faces_within(self.walls, low, high, inside)
 
     def layers(self, largest: float, floor: float) -> Iterator[Layer]:  # noqa: ARG002
-        """Layers of places, one upon the other, from which beads up to a radius (m) are poured above a height (m)."""
+        """Layers of places from which beads are poured, the lowest one first.
+
+        Parameters
+        ----------
+        largest : float
+            Radius of the largest bead, m.
+        floor : float
+            Largest height of the bodies that are there already, m.
+        """
         yield from ()
 
     def check_pour(self, count: int, largest: float, floor: float) -> None:  # noqa: ARG002
-        """Raise `InputError` unless a number of beads up to a radius (m) can be poured above a height (m)."""
-        raise unusable("boundary.shape", 'expected a container, such as "box": a mixture is poured into it')
+        """Check that there are places for all beads (`layers`).
+
+        Parameters
+        ----------
+        count : int
+            Number of beads.
+        largest, floor : float
+            As for `layers`.
+
+        Raises
+        ------
+        InputError
+            If there are fewer places than beads.
+        """
+        expected = 'expected a container, such as "box": a mixture is poured into it'
+        raise unusable("boundary.shape", expected)
 
 
 def damping_between(width: float, radius: float) -> float:
     """`Shape.damping` between upright walls at a distance (m).
 
-    Neighbouring sides of an octagon (1.7) do not count: the time step of loose beads allows for more
-    neighbours (`walkers.inputs.tables.bodies.Mixture.bridged`).
+    Neighbouring sides of an octagon (1.7) do not count: the time step of loose beads allows for
+    more neighbours (`walkers.inputs.tables.bodies.Mixture.bridged`).
     """
     return 2.0 if width < _TWO_SIDES * radius else 1.0
 
 
 def upright_walls(half: float, normals: Mapping[str, tuple[float, float]]) -> tuple[Wall, ...]:
-    """Flat side walls at a distance ``half`` (m) from the z axis; x and y of their normals by their names."""
-    return tuple(Flat((-half * x + 0.0, -half * y + 0.0, 0.0), (x, y, 0.0), name) for name, (x, y) in normals.items())
+    """Flat walls at a distance ``half`` (m) from the z axis; x and y of normals by name."""
+    walls = []
+    for name, (x, y) in normals.items():
+        point = (-half * x + 0.0, -half * y + 0.0, 0.0)
+        walls.append(Flat(point, (x, y, 0.0), name))
+    return tuple(walls)

@@ -38,7 +38,7 @@ class Plane(Table):
 
 @dataclass(frozen=True)
 class VesselShape(Container):
-    """A vessel of planes. ``width`` (m) is twice its largest extent from the origin along x or y."""
+    """A vessel of planes. ``width`` (m) is twice its extent from the origin along x or y."""
 
     name: ClassVar[str] = "vessel"
     sizes: ClassVar[tuple[str, ...]] = ()
@@ -49,9 +49,10 @@ class VesselShape(Container):
 
     @classmethod
     def of(cls, table: Any) -> Self:
-        """The vessel of a table with the keys of ``[boundary]``: of facets if it has triangles, else of planes."""
-        kind = MeshVesselShape if table.triangles else VesselShape
-        return kind(table.width, table.height, table.planes, table.points, table.triangles)  # type: ignore[return-value]
+        """The vessel of a table with the keys of ``[boundary]``, of facets if it has triangles."""
+        if table.triangles and cls is VesselShape:
+            return MeshVesselShape.of(table)  # type: ignore[return-value]
+        return super().of(table)
 
     @cached_property
     def vessel(self) -> Vessel:
@@ -64,7 +65,8 @@ class VesselShape(Container):
         first = self.planes[0]
         level = first.normal[2] > 1.0 - 1e-12 and abs(first.point[2]) < 1e-9
         names = names_of_faces([plane.normal for plane in self.planes], floor=level)
-        return tuple(Flat(plane.point, plane.normal, name) for plane, name in zip(self.planes, names, strict=True))
+        named = zip(self.planes, names, strict=True)
+        return tuple(Flat(plane.point, plane.normal, name) for plane, name in named)
 
     @property
     def cross_section(self) -> float:
@@ -75,12 +77,17 @@ class VesselShape(Container):
         """Volume below a level (m), m³."""
         return self.vessel.volume(level)
 
-    def outline(self, low: FloatArray, high: FloatArray, inside: FloatArray) -> list[FloatArray]:  # noqa: ARG002
+    def outline(
+        self,
+        low: FloatArray,  # noqa: ARG002
+        high: FloatArray,  # noqa: ARG002
+        inside: FloatArray,  # noqa: ARG002
+    ) -> list[FloatArray]:
         """The triangles of the surface, arrays of shape (3, 3), m."""
         return [*self.vessel.points[self.vessel.triangles]]
 
     def layers(self, largest: float, floor: float) -> Iterator[Layer]:
-        """Layers of places above a height (m) up to twice the height of the vessel; wide ones in several strips."""
+        """Layers up to twice the height of the vessel (see `Container.layers`), wide ones in strips."""
         pitch = 2.0 * LOOSE * largest
         columns = ceil(self.width / pitch)
         line = pitch * (np.arange(columns) - (columns - 1) / 2.0)
@@ -96,7 +103,7 @@ class VesselShape(Container):
                     yield Layer([(x, y) for x, y, _ in free.tolist()], pitch, True, level)
 
     def check_pour(self, count: int, largest: float, floor: float) -> None:
-        """Raise `InputError` if there are fewer places than beads; places are counted until they suffice."""
+        """Raise `InputError` unless the beads fit (see `Container.check_pour`); stops when they do."""
         room = 0
         for layer in self.layers(largest, floor):
             room += len(layer.places)
@@ -125,11 +132,11 @@ class MeshVesselShape(VesselShape):
 
     @cached_property
     def walls(self) -> tuple[Wall, ...]:
-        """The facets: faces, the floor first if there is one, then edges and corners that stand out."""
+        """Faces, the floor first if there is one, then edges and corners that stand out."""
         return self.vessel.facets
 
     def damping(self, radius: float) -> float:  # noqa: ARG002
-        """See `Shape.damping`; neighbouring faces turn by a small angle, so their normals are nearly the same."""
+        """See `Container.damping`; normals of neighbouring faces are nearly the same."""
         return 2.0
 
     def side_clearance(self, places: FloatArray) -> FloatArray:
