@@ -22,19 +22,36 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class Factor:
-    """A property in which points differ: its keys, its label, and a number (in its unit) or a text for each point.
+    """A property in which the points of a sweep differ.
 
-    Each key of a sample is a factor. Points of a sample do not share values. Those of log-uniform ranges have an axis
-    with a logarithmic scale (``is_log``).
+    Attributes
+    ----------
+    keys
+        The keys, or the column, that it is made of.
+    name
+        What axes and legends call it, without a unit.
+    values
+        For each point a number, in the unit, or a text.
+    is_number
+        Whether the values are numbers.
+    is_sample
+        Whether it is one of the keys of a sample, whose points do not share values.
+    is_log
+        Whether its range is log-uniform, so that its axis has a logarithmic scale.
+    unit
+        Displayed unit of the numbers.
+    further_keys
+        Keys that change together with it.
     """
 
     keys: tuple[str, ...]
-    label: str
+    name: str
     values: Sequence[Any]
     is_number: bool
     is_sample: bool = False
     is_log: bool = False
     unit: str = ""
+    further_keys: tuple[str, ...] = ()
 
     @property
     def levels(self) -> list[Any]:
@@ -43,10 +60,15 @@ class Factor:
         return sorted(different) if self.is_number else list(different)
 
     @property
-    def name(self) -> str:
-        """The label without the unit and without further keys."""
-        first = self.label.partition("\n")[0]
-        return first.removesuffix(f" ({self.unit})") if self.unit else first
+    def label(self) -> str:
+        """The name with the unit, and below it the keys that change together with it."""
+        label = with_unit(self.name, self.unit)
+        if not self.further_keys:
+            return label
+        words = ", ".join(readable_key(key) for key in self.further_keys)
+        if len(self.further_keys) > 2:
+            words = f"{len(self.further_keys)} further keys"
+        return f"{label}\n(and with it {words})"
 
     def is_among(self, factors: Sequence[Factor]) -> bool:
         """Whether one of several factors has the keys of this one, or distinguishes the same points."""
@@ -98,7 +120,7 @@ def _factor_of_key(table: pd.DataFrame, key: str) -> Factor:
         return Factor((key,), readable_key(key), texts, is_number=False)
     return Factor(
         keys=(key,),
-        label=with_unit(readable_key(key), unit or ""),
+        name=readable_key(key),
         values=[float(value) for value in values],
         is_number=True,
         is_log=table.attrs.get("sampled", {}).get(key, False),
@@ -131,20 +153,14 @@ def _named_points(factors: Sequence[Factor]) -> Factor:
         values = [factor.text(value) for factor, value in zip(factors, point, strict=True)]
         texts.append(", ".join(values))
     keys = tuple(key for factor in factors for key in factor.keys)
-    label = ", ".join(factor.name for factor in factors)
-    return Factor(keys, label, texts, is_number=False)
+    name = ", ".join(factor.name for factor in factors)
+    return Factor(keys, name, texts, is_number=False)
 
 
 def _with_further_keys(first: Factor, factors: Sequence[Factor]) -> Factor:
     """The first of several factors that change together; its label names the others."""
-    further = [key for factor in factors for key in factor.keys if key not in first.keys]
-    if not further:
-        return first
-    words = ", ".join(readable_key(key) for key in further)
-    if len(further) > 2:
-        words = f"{len(further)} further keys"
-    label = f"{first.label}\n(and with it {words})"
-    return replace(first, keys=(*first.keys, *further), label=label)
+    further = tuple(key for factor in factors for key in factor.keys if key not in first.keys)
+    return replace(first, keys=(*first.keys, *further), further_keys=further)
 
 
 def readable_key(key: str) -> str:
@@ -164,4 +180,4 @@ def numbers_of(rows: pd.DataFrame, name: str, option: str) -> Factor:
     values = pd.to_numeric(rows[name], errors="coerce").to_numpy(dtype=float, na_value=np.nan)
     if len(rows) and np.isnan(values).all():
         raise refused(option, f'"{name}" has no number that could be drawn')
-    return Factor((name,), with_unit(readable_key(name), unit), (values * factor).tolist(), True, unit=unit)
+    return Factor((name,), readable_key(name), (values * factor).tolist(), is_number=True, unit=unit)

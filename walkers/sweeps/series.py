@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from walkers.postprocess.measure.quantities import scatter_of
+from walkers.postprocess.measure.quantities import LABELS, scatter_of
 from walkers.postprocess.show.drawing import errors_seen, plain_text
 from walkers.sweeps.factors import Factor, numbers_of
 from walkers.sweeps.predictions import Theory
@@ -104,10 +104,10 @@ def points_of(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, p
     for name, source in sources.items():
         if source and source in done and done[source].notna().any():
             points[name] = numbers_of(done, source, "y").values
-    label = numbers_of(done, column, "y").label
-    if "down" in points:
-        label = label.replace(", facing right (up)", "")
-    return label, points
+    factor = numbers_of(done, column, "y")
+    if "down" in points:  # the figure has walkers of both directions
+        factor = replace(factor, name=LABELS[column]["both"])
+    return factor.label, points
 
 
 def looks_of(hue: Factor | None, *, hollow: bool) -> dict[Any, dict[str, Any]]:

@@ -67,7 +67,7 @@ GROUPS: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(group) for name,
 SHOWN: Mapping[str, frozenset[str]] = {name: frozenset(names) for name, names in _FILE["shown"].items()}
 """Which numbers are shown (`walkers.postprocess.measure.numbers.rows`), and which are of walkers that face up."""
 LABELS: Mapping[str, Mapping[str, str]] = _FILE["labels"]
-"""Labels of numbers that are called otherwise on a ``level`` boundary and on a ``slope``."""
+"""Labels of numbers of walkers that face up or down: on a ``level`` boundary, on a ``slope``, and of ``both``."""
 _NUMBERS = [
     quantity
     for number in (number for group in GROUPS.values() for number in group)
