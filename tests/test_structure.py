@@ -1,0 +1,120 @@
+"""How the code is built: what CONTRIBUTING says of the house, and that decisions are taken from values."""
+
+from __future__ import annotations
+
+import ast
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text("utf-8")
+CUTTING = {
+    "partition",
+    "rpartition",
+    "split",
+    "rsplit",
+    "replace",
+    "startswith",
+    "endswith",
+    "removeprefix",
+    "removesuffix",
+    "find",
+    "index",
+    "count",
+}
+"""Methods that search a text or cut it."""
+TEXTS = {"message", "reason", "expected", "meaning", "label", "notes", "warnings", "problems", "args"}
+"""Attributes that are sentences, or hold them."""
+ALLOWED = {
+    # Parsl repeats its first error, and has no other form of it.
+    ("walkers/sweeps/scheduler.py", "str(error).partition('Error 2:')"),
+    # A label with a place for the number of a bead, such as "rotation of bead *".
+    ("walkers/postprocess/measure/quantities.py", "quantity.label.replace('*', number[1] if number else '*')"),
+}
+"""What takes no decision."""
+
+
+def _is_message(value: ast.expr, errors: set[str]) -> bool:
+    """Whether an expression is the text of an error, or an attribute that is a sentence."""
+    match value:
+        case ast.Call(func=ast.Name("str"), args=[ast.Name(name)]):
+            return name in errors
+        case ast.Call(func=ast.Attribute(attr="join"), args=[argument]):
+            return _is_message(argument, errors)
+        case ast.Subscript(value=inner):
+            return _is_message(inner, errors)
+        case ast.Attribute(attr=name) | ast.Name(name):
+            return name in TEXTS
+    return False
+
+
+def _decisions_from_texts(tree: ast.AST) -> Iterator[str]:
+    """Expressions that search or cut a message."""
+    errors = {node.name for node in ast.walk(tree) if isinstance(node, ast.ExceptHandler) and node.name}
+    errors |= {"error", "failure", "stop", "warning", "problem"}
+    for node in ast.walk(tree):
+        match node:
+            case ast.Call(func=ast.Attribute(value=value, attr=method), args=[_, *_]):
+                if method in CUTTING and _is_message(value, errors):
+                    yield ast.unparse(node)
+            case ast.Compare(left=ast.Constant(str()), ops=[ast.In() | ast.NotIn()], comparators=[value]):
+                if _is_message(value, errors):
+                    yield ast.unparse(node)
+            case ast.Assign(targets=[ast.Attribute(attr="args")]):
+                yield ast.unparse(node)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "'timestamp' in str(error)",
+        "str(failure).split(' (see ')[0]",
+        "failure.message.partition(' (see ')",
+        "'facing up' in quantity.meaning",
+        "error.problems[0].expected.replace('a', 'b')",
+        "'edited' in ' '.join(run.notes)",
+        "stop.args = ('words',)",
+    ],
+)
+def test_what_searches_or_cuts_a_message_is_recognised(line: str) -> None:
+    (decision,) = _decisions_from_texts(ast.parse(line))
+    assert decision in line
+
+
+def test_no_message_is_searched_or_cut() -> None:
+    decisions = {
+        (path.relative_to(ROOT).as_posix(), text)
+        for path in sorted((ROOT / "walkers").rglob("*.py"))
+        for text in _decisions_from_texts(ast.parse(path.read_text("utf-8")))
+    }
+    assert decisions == ALLOWED
+
+
+def _rooms_of_the_table() -> list[str]:
+    """Names of the rooms of ``walkers/``, in the order of the table of CONTRIBUTING."""
+    _, _, table = CONTRIBUTING.partition("| room | holds |")
+    rows = table.split("\n\n")[0]
+    return re.findall(r"(?m)^\| `walkers/(\w+)(?:\.py)?` \|", rows)
+
+
+def test_contributing_names_every_room_and_no_other() -> None:
+    rooms = {path.parent.name for path in (ROOT / "walkers").glob("*/__init__.py")}
+    assert set(_rooms_of_the_table()) == rooms | {"api"}
+
+
+def test_rooms_are_listed_in_the_order_in_which_they_know_each_other() -> None:
+    (contract, *_) = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]["contracts"]
+    layers = [set(layer.split(" | ")) for layer in reversed(contract["layers"])]
+    place = {room: number for number, layer in enumerate(layers) for room in layer}
+    rooms = _rooms_of_the_table()
+    assert [place[room] for room in rooms] == sorted(place[room] for room in rooms)
+
+
+def test_places_that_contributing_names_exist() -> None:
+    places = set(re.findall(r"`((?:walkers|studies|tests|docs)/[\w./-]+)`", CONTRIBUTING))
+    assert len(places) > 50
+    assert not sorted(place for place in places if not (ROOT / place).exists())
