@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+import subprocess
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -112,6 +113,13 @@ def test_rooms_are_listed_in_the_order_in_which_they_know_each_other() -> None:
     place = {room: number for number, layer in enumerate(layers) for room in layer}
     rooms = _rooms_of_the_table()
     assert [place[room] for room in rooms] == sorted(place[room] for room in rooms)
+
+
+def test_contributing_gives_a_reason_for_every_entry_at_the_top() -> None:
+    _, _, table = CONTRIBUTING.partition("| entry | reason |")
+    named = set(re.findall(r"`([\w.]+)`", "".join(re.findall(r"(?m)^\| (`[^|]+) \|", table.split("\n\n")[0]))))
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert named == {file.partition("/")[0] for file in listed.splitlines()}
 
 
 def test_places_that_contributing_names_exist() -> None:
