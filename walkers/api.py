@@ -410,6 +410,12 @@ def finished_at(named: Reference) -> Run | None:
     return _measured(Run(named.path)) if on_disk.is_finished(named.path) else None
 
 
+def case_to_run(named: tuple[Reference, Run | None]) -> Case:
+    """The case of a name, or of the finished run that it means: a deck that was run by hand has no other."""
+    reference, run = named
+    return reference.case if run is None else run.case
+
+
 def _measured(run: Run) -> Run:
     """The run; a finished run is measured again if its result or a table cannot be read."""
     if on_disk.is_finished(run.check().directory):

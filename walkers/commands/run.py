@@ -96,7 +96,7 @@ def run(
     accuracy
         Also run with smaller time steps and harder beads, and print the numerical error of the result.
     """
-    from walkers.api import finished_at
+    from walkers.api import case_to_run, finished_at
     from walkers.runner.failures import EngineFailure
     from walkers.runs.names import find
     from walkers.runs.preview import notes
@@ -108,7 +108,7 @@ def run(
     # Report a mistake in the last file before the first run starts.
     named = [find(case, at.out, at.values) for case in cases]
     finished = [None for _ in named] if force else apply_all(finished_at, named)
-    loaded = apply_all(lambda reference: reference.case, named)
+    loaded = apply_all(case_to_run, zip(named, finished, strict=True))
     if accuracy:
         apply_all(times_of, loaded)
     if spread:
