@@ -26,9 +26,10 @@ from walkers.postprocess.measure import meetings
 from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.numbers import band_text
 from walkers.postprocess.measure.uncertainty import SPREAD_NAME, held_text, spread_of
+from walkers.sweeps.record import SweepRecord
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.spread import describe, run_spread, spread_in, spread_sweep
-from walkers.sweeps.table import groups, thresholds
+from walkers.sweeps.table import groups, key_values, table_of, thresholds
 
 Make = Callable[..., Sweep]
 
@@ -229,6 +230,14 @@ def test_points_that_differ_in_their_seed_alone_are_a_group() -> None:
     assert found[1][0] == {"drive.frequency": 60.0, "contact.law": 1.0}
     ((named, rows),) = groups(table.loc[[0, 2, 4]])
     assert (named, list(rows.index), rows.attrs["varied"]) == ({}, [0, 2, 4], list(table))
+
+
+def test_a_key_may_be_a_word_at_some_points_and_a_list_at_others(make: Make, tmp_path: Path) -> None:
+    sweep = make(axes={"drive": {"axis": ["x", "y", [1, 0, 1]]}})
+    record = SweepRecord(tmp_path / "test", sweep, [f"base-{number:012d}" for number in range(3)])
+    table = table_of(record).frame
+    assert key_values(table, "drive.axis") == (["x", "y", [1, 0, 1]], "")
+    assert [len(rows) for _, rows in groups(table)] == [1, 1, 1]
 
 
 def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives() -> None:

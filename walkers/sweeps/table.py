@@ -159,14 +159,18 @@ def _frame(sweep: Sweep, points: Sequence[PointState]) -> pd.DataFrame:
 
 
 def _varied_columns(sweep: Sweep) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of the columns of the varied keys; a key with several numbers has a column for each."""
+    """Unit and meaning of the columns of the varied keys.
+
+    A key with several numbers has a column for each. If it has a word at other points, such as an
+    axis that is ``"x"`` or a direction, the words have a column too.
+    """
     columns = {}
     values_of = zip(*sweep.values, strict=True)
     for (key, unit), values in zip(sweep.units.items(), values_of, strict=True):
-        parts = max((len(value) for value in values if isinstance(value, list)), default=0)
-        names = [key]
-        if parts:
-            names = [f"{key}[{part}]" for part in range(parts)]
+        lengths = [len(value) for value in values if isinstance(value, list)]
+        names = [f"{key}[{part}]" for part in range(max(lengths, default=0))]
+        if len(lengths) < len(values):
+            names.insert(0, key)
         for name in names:
             columns[name] = (unit or "", "varied")
     return columns
@@ -245,8 +249,14 @@ def key_values(frame: pd.DataFrame, key: str) -> tuple[list[Any], str | None]:
     """The values of a varied key at each point of a sweep's table, lists of keys with several numbers; their unit."""
     names = [name for name in frame.attrs["varied"] if name == key or name.startswith(f"{key}[")]
     rows = frame[names].astype(object)
-    values = rows[key].tolist() if names == [key] else [row.dropna().tolist() for _, row in rows.iterrows()]
-    return values, frame.attrs["units"][names[0]]
+    unit = frame.attrs["units"][names[0]]
+    if names == [key]:
+        return rows[key].tolist(), unit
+    values: list[Any] = []
+    for _, row in rows.iterrows():
+        given = row.dropna()
+        values.append(given[key] if key in given else given.tolist())
+    return values, unit
 
 
 def key_texts(frame: pd.DataFrame) -> pd.DataFrame:
