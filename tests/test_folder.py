@@ -39,7 +39,7 @@ from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.runs.case_text import readable
 from walkers.runs.comparison import Side, compare_runs
 from walkers.runs.listing import bytes_text, weigh
-from walkers.runs.removal import remove
+from walkers.runs.removal import remove, unfinished_in
 from walkers.sweeps.record import read_record
 from walkers.sweeps.removal import named_in
 from walkers.sweeps.scheduler import Options, plan_sweep
@@ -233,6 +233,7 @@ def test_clean_holds_the_lock_and_takes_the_manifest_first(out: Path, monkeypatc
             patched.setattr("walkers.runs.removal.shutil.rmtree", _interrupted)
             remove(removals[:1])
         assert (first / "case.json").is_file() and not (first / MANIFEST_NAME).exists()
+        assert first in [removal.path for removal in unfinished_in(out)]
         (kept,) = remove(removals[1:]).items()
         assert kept == (second, "kept: a process is computing it")
     assert (second / MANIFEST_NAME).is_file()
@@ -240,11 +241,35 @@ def test_clean_holds_the_lock_and_takes_the_manifest_first(out: Path, monkeypatc
     assert not first.exists() and not second.exists()
 
 
-def _interrupted(directory: Path) -> None:
-    """As a removal that is interrupted at its start; the lock of the run is held."""
-    place = directory.with_name(f"{directory.name}.lock")
-    assert place.is_file()
+def _interrupted(entry: Path) -> None:
+    """As a removal that is interrupted at a folder in the run; the lock of the run is held."""
+    run = entry.parent
+    assert run.with_name(f"{run.name}.lock").is_file()
     raise KeyboardInterrupt
+
+
+def test_a_removal_that_is_interrupted_leaves_the_case_until_the_end(out: Path) -> None:
+    """What is left of a run can be found as long as its folder is there."""
+    place = next(iter(finished_places(out).values()))
+    names = {entry.name for entry in place.iterdir()}
+    left = []
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("walkers.runs.removal._remove_directory", lambda folder: left.extend(folder.iterdir()))
+        remove(named_in(out, [place]))
+    assert len(names) > 3
+    assert [entry.name for entry in left] == ["case.json"]
+
+
+def test_a_lock_that_a_process_has_taken_since_stays(out: Path) -> None:
+    lock = out / "gone-0123456789ab.lock"
+    lock.touch()
+    removals = [removal for removal in unfinished_in(out) if removal.path == lock]
+    with locked([lock.with_suffix("")]):
+        assert remove(removals) == {lock: "kept: a process is computing it"}
+        assert lock.is_file()
+    lock.touch()
+    assert remove(removals) == {}
+    assert not lock.exists()
 
 
 def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:

@@ -1,7 +1,8 @@
 """Removal of runs, and of what killed processes left in a folder of runs.
 
-Runs in progress are never removed: removal holds the lock of the run. The manifest of a finished run is removed first:
-after an interruption the rest is no finished run, and the next removal takes it.
+Runs in progress are never removed: removal holds the lock of the run. The manifest of a finished run is
+removed first and its case last: after an interruption the rest is an interrupted run, and the next
+removal takes it.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from pathlib import Path
 from walkers.files import VTK_SCRATCH, abandoned
 from walkers.rounding import counted, duration_text
 from walkers.runner import directory as on_disk
+from walkers.runner.directory import CASE_NAME
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runs.listing import Entry, bytes_text, place_of, runs_in, weigh
 from walkers.text import aligned
@@ -155,8 +157,8 @@ def _remove(removal: Removal) -> str:
     if removal.kind is Kind.RUN:
         return _remove_run(removal.path)
     if removal.kind is Kind.LOCK:
-        with on_disk.locked([removal.path.with_suffix("")]):
-            return ""  # a lock file goes with its lock
+        with on_disk.locked([removal.path.with_suffix("")]) as ours:
+            return "" if ours else _IN_PROGRESS  # a lock file goes with its lock
     _remove_directory(removal.path)
     return ""
 
@@ -169,8 +171,20 @@ def _remove_run(directory: Path) -> str:
         on_disk.recover(place)
         if not directory.is_symlink():
             (directory / MANIFEST_NAME).unlink(missing_ok=True)
+            _empty(directory, but=CASE_NAME)
         _remove_directory(directory)
     return ""
+
+
+def _empty(directory: Path, *, but: str) -> None:
+    """Remove what a directory contains, without the entry of one name."""
+    for entry in sorted(directory.iterdir()):
+        if entry.name == but:
+            continue
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry)
+        else:
+            entry.unlink()
 
 
 def _remove_directory(directory: Path) -> None:
