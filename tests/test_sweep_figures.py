@@ -106,6 +106,17 @@ def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_
         assert (errors > 0.0).all()
 
 
+def test_a_key_with_one_value_among_the_finished_points_takes_no_colours() -> None:
+    keys = {"drive.frequency": "Hz", "liquid.surface_tension": "N/m", "contact.friction.bead_wall": ""}
+    rows = [[60.0, 0.03, 0.1], [70.0, 0.03, 0.1], [60.0, 0.03, 0.2], [70.0, 0.03, 0.2], [60.0, 0.07, 0.1]]
+    table = _table(keys, rows, velocity=[1e-3, 2e-3, 3e-3, 4e-3, 5e-3])
+    table.attrs["axes"] = [(key,) for key in keys]
+    table.loc[4, "status"] = "missing"
+    with pytest.warns(LeftOutWarning, match="1 missing"):
+        figure = figure_of(table)
+    assert _legend(figure) == ["0.1", "0.2"]
+
+
 @pytest.mark.parametrize(
     ("keys", "options", "message"),
     [

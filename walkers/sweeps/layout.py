@@ -84,13 +84,17 @@ def layout_of(table: pd.DataFrame, rows: pd.DataFrame, options: FigureOptions = 
 
 
 def _factors_of_rows(table: pd.DataFrame, rows: pd.DataFrame) -> list[Factor]:
-    """The factors of a table, with the values of some of its rows."""
+    """The factors of a table with the values of some of its rows.
+
+    Those that have one value in these rows are left out, unless all have.
+    """
     places = table.index.get_indexer(rows.index).tolist()
     factors = []
     for factor in factors_of(table):
         values = [factor.values[place] for place in places]
         factors.append(replace(factor, values=values))
-    return factors
+    varying = [factor for factor in factors if len(factor.levels) > 1]
+    return varying or factors
 
 
 def _chosen(option: str, name: str | None, factors: Sequence[Factor], rows: pd.DataFrame) -> Factor | None:
