@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from itertools import islice
 from math import radians
@@ -12,7 +13,9 @@ import numpy as np
 import pytest
 
 from walkers.arrays import FloatArray
+from walkers.errors import InputError
 from walkers.inputs.meshes.facet import Facet
+from walkers.inputs.reading import load_case
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.shapes import walls
 from walkers.inputs.tables.shapes.container import Container
@@ -177,3 +180,13 @@ def test_nobody_asks_which_kind_a_wall_is() -> None:
     templates = [path.read_text("utf-8") for path in sorted(PACKAGE.rglob("*.j2"))]
     assert len(templates) > 10
     assert not [text for text in templates if "wall." in text]
+
+
+@pytest.mark.parametrize("count", range(140, 171))
+def test_the_height_that_is_asked_for_is_enough(count: int) -> None:
+    """It is printed with two decimals, rounded up."""
+    with pytest.raises(InputError, match="too low") as refusal:
+        load_case("pile-ci", {"mixture.count": count, "boundary.height": "3 mm"})
+    height = re.search(r"expected (\S+ mm) or more", str(refusal.value))
+    assert height is not None
+    load_case("pile-ci", {"mixture.count": count, "boundary.height": height[1]})

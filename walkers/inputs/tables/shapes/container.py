@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import count as numbers_from
-from math import inf
+from math import ceil, inf
 from typing import ClassVar
 
 import numpy as np
@@ -98,5 +98,7 @@ class Container(Shape):
         layers = -(-count // len(layer.places)) if layer.places else inf
         level = floor + layers * 2.0 * LOOSE * largest
         if level > 2.0 * self.height:  # walls and simulation go on to there
-            needed = f"expected {level / 2.0 * 1e3:.3g} mm or more"
-            raise unusable("boundary.height", f"too low for {count} beads; {needed}")
+            expected = "expected a wider boundary"
+            if layer.places:
+                expected = f"expected {ceil(level / 2.0 * 1e5) / 100.0:g} mm or more"
+            raise unusable("boundary.height", f"too low for {count} beads; {expected}")
