@@ -6,6 +6,7 @@ import importlib
 import inspect
 import json
 import os
+import pickle
 import pkgutil
 import re
 import shutil
@@ -34,7 +35,7 @@ from walkers import load_case
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.commands import ALL_COMMANDS, Command
-from walkers.errors import InputError
+from walkers.errors import InputError, InputErrors, WalkersError, refused, unusable
 from walkers.extras import EXTRAS, ExtraMissing, module_of
 from walkers.inputs.reading import shipped
 from walkers.main import program
@@ -42,6 +43,7 @@ from walkers.postprocess.measure.results import read
 from walkers.postprocess.measure.tables import read_table
 from walkers.runner.binary import find_engine
 from walkers.runner.directory import is_finished
+from walkers.runner.failures import EngineFailure
 from walkers.runner.manifest import read_manifest
 from walkers.sweeps.scheduler import Options
 from walkers.sweeps.site import load_site
@@ -284,6 +286,21 @@ def test_every_public_function_of_the_modules_of_commands_is_a_command() -> None
         of_apps = {f"{module}:{name}" for _, app in apps for name in map(str, app) if name[0] != "-"}
         of_apps |= {f"{module}:{app.default_command.__name__}" for _, app in apps if app.default_command}
         assert own - of_apps <= places
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        InputErrors([refused("one", "expected another"), unusable("drive.frequency", "expected Hz", 3)]),
+        ExtraMissing("report", ["k3d"]),
+        EngineFailure("stopped", Path("runs/one"), lost=3),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+def test_errors_come_back_from_another_process(error: WalkersError) -> None:
+    """As those of the workers of an executor do."""
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), str(again), vars(again).keys()) == (type(error), str(error), vars(error).keys())
 
 
 def test_help_names_every_command() -> None:

@@ -75,11 +75,25 @@ class InputError(WalkersError):
 
 
 class InputErrors(InputError):
-    """Errors of several inputs, each with its own source."""
+    """Errors of several inputs, each with its own source.
+
+    Attributes
+    ----------
+    errors
+        The errors, at least one.
+    source
+        That of the first error.
+    problems
+        Those of all errors.
+    """
 
     def __init__(self, errors: Sequence[InputError]) -> None:
         super().__init__(errors[0].source, [problem for error in errors for problem in error.problems])
         self.errors = tuple(errors)
+
+    def __reduce__(self) -> tuple[type[InputErrors], tuple[Sequence[InputError]]]:
+        """How it is made again in another process."""
+        return InputErrors, (self.errors,)
 
     def __str__(self) -> str:
         return "\n".join(dict.fromkeys(map(str, self.errors)))

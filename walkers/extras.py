@@ -26,8 +26,14 @@ class ExtraMissing(InputError):
     """Packages of an extra that are not installed; the message says how to install them."""
 
     def __init__(self, extra: str, missing: list[str]) -> None:
+        self.extra = extra
+        self.missing = missing
         how = f"make extras, or pip install 'granular-walkers[{extra}]'"
         super().__init__(EXTRAS[extra][0], [Problem("", None, f"needs {', '.join(missing)}: {how}")])
+
+    def __reduce__(self) -> tuple[type[ExtraMissing], tuple[str, list[str]]]:
+        """How it is made again in another process."""
+        return ExtraMissing, (self.extra, self.missing)
 
     def __str__(self) -> str:
         return f"{self.source} {self.problems[0]}"
