@@ -311,6 +311,8 @@ COMMANDS: list[tuple[str, str]] = [
     ("show --theory ruby", "ruby: is a calibration: walkers calibrate ruby"),
     ("render {sweep}", "is a sweep: expected one of its runs"),
     ("plot {archive}", "an archive: unpack it"),
+    ("run {archive}", "an archive: unpack it"),
+    ("compare {archive} fig1b", "an archive: unpack it"),
     ("list {run}", "is a run: walkers run "),
     ("compare {sweep} {run}", "is a sweep's directory: walkers list"),
     ("climb {sweep}", "expected a finished run of a pile"),

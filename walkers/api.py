@@ -97,7 +97,7 @@ def load(reference: Given | Reference, out: str | Path = DEFAULT_OUT, changes: C
     True
     """
     named = find(reference, out, changes)
-    if named.means_case:
+    if named.means_case or named.kind == "case":
         run = _run_of_case(named)
     elif named.kind == "sweep":
         return Sweep(named.path)

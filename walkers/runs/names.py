@@ -22,13 +22,14 @@ from walkers.runner.binary import find_engine
 from walkers.runner.failures import EngineMissing
 from walkers.runner.manifest import read_manifest
 
-Kind = Literal["run", "sweep", "calibration", "archive", "deck", "folder", "case"]
+NotARun = Literal["sweep", "calibration", "archive", "deck", "folder"]
+Kind = Literal["run", "case"] | NotARun
 Given: TypeAlias = "Case | str | Path | Mapping[str, Any]"
 """What may stand for a case: a resolved case, its file or name, or its tables."""
 Changes: TypeAlias = "Mapping[str, Any] | None"
 """Other values of a case, by dotted keys."""
 
-_NOT_A_RUN: Mapping[Kind, str] = {
+_NOT_A_RUN: Mapping[NotARun, str] = {
     "folder": "not a finished run: expected a folder with a manifest.json",
     "deck": "is a deck that was run by hand; first do: walkers run {name}",
     "calibration": "a calibration's outcome: its report is calibration.md",
@@ -37,7 +38,7 @@ _NOT_A_RUN: Mapping[Kind, str] = {
 }
 
 
-def not_a_run(name: object, kind: Kind) -> InputError:
+def not_a_run(name: object, kind: NotARun) -> InputError:
     """An error that says what a name means, where a run was expected."""
     return refused(name, _NOT_A_RUN[kind].format(name=name))
 
@@ -98,7 +99,7 @@ class Reference:
             raise not_a_run(given, self.kind)
         if self.kind == "folder":
             raise refused(given, "is a folder without a run")
-        if self.kind == "deck":
+        if self.kind in ("deck", "archive"):
             raise not_a_run(given, self.kind)
         return load_case(given, self.changes)
 
@@ -116,7 +117,7 @@ class Reference:
 
 
 def find(given: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Reference:
-    """Find what a user means by a name; nothing is read but names of files.
+    """Find what a user means by a name. No case is read, and no run.
 
     A folder does not hide a shipped case of the same name. The file of a sweep means the sweep if it was run.
 
@@ -124,7 +125,8 @@ def find(given: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Chang
     ----------
     given
         The directory of a run or a sweep, its name in the folder ``out``, an archive, a deck that was run by hand, or a
-        case (resolved, tables, file or shipped name). A reference is returned as it is.
+        case (resolved, tables, file or shipped name). A reference is returned as it is, whatever ``out`` and
+        ``changes`` are.
     out
         Folder of the run directories.
     changes
@@ -137,13 +139,12 @@ def find(given: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Chang
     if isinstance(given, (str, Path)):
         path = Path(given)
         with suppress(OSError):  # a name that no file system accepts
-            kind, path = next(_meanings(path, Path(out)))
+            kind, path = next(_meanings(path, Path(out), is_shipped=str(given) in shipped("case")))
     return Reference(given, kind, path, Path(out), changes or {})
 
 
-def _meanings(path: Path, out: Path) -> Iterator[tuple[Kind, Path]]:
-    """What a path may mean, and where that is, the most likely first."""
-    is_shipped = str(path) in shipped("case")
+def _meanings(path: Path, out: Path, *, is_shipped: bool) -> Iterator[tuple[Kind, Path]]:
+    """What a path may mean, and where that is, the most likely first; whether it is the name of a shipped case."""
     kinds: tuple[Kind, ...] = ("run", "sweep", "calibration")
     for place in (path, out / path):
         for kind in kinds:
