@@ -93,6 +93,8 @@ CASES: list[tuple[dict[str, Any], str]] = [
     )),
     # Bodies and boundaries
     ({"mixture": MIXTURE, "boundary": {"shape": "box", "width": "1.5 mm", "height": "9 mm"}}, "boundary.width = "),
+    ({"dimers": None, "mixture": MIXTURE, "boundary": {"shape": "box", "width": "9 mm", "height": "9 mm"},
+      "run": {"longest_settling": "1e4 s"}}, 'run.longest_settling = "1e4 s": expected less than'),
     ({"liquid": {"conserved": True}}, "liquid.conserved = true: "),
     ({"mixture": {**MIXTURE, "small": None, "small_diameters": ["0.63 mm", "0.6 mm"]}},
      'mixture.small_diameters = ["0.63 mm", "0.6 mm"]: expected the smaller one first'),

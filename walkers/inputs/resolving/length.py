@@ -15,6 +15,8 @@ from walkers.rounding import percent
 
 MOST_STEPS = 2**31 - 1
 _SEGMENT_SECONDS = 0.5
+_SETTLING_MARGIN = 1.0
+"""Time, s, that settling may exceed its limit by: it ends with a segment."""
 _MOST_CYCLES = 60
 _SAMPLES = 20
 _NEARLY_SYMMETRIC = 0.08  # sin δ of dimers below which speeds of steady walkers still creep …
@@ -90,7 +92,13 @@ def run_of(case: Setup) -> tuple[Run, dict[str, Source]]:
             "longest_settling": rest or None,
         },
     )
-    most = MOST_STEPS // steps - (ceil((rest + 1.0) * frequency) if rest else 0)
+    most = MOST_STEPS // steps
+    if rest:
+        most -= ceil((rest + _SETTLING_MARGIN) * frequency)
+        if most < 1:
+            longest = MOST_STEPS * time_step - _SETTLING_MARGIN
+            message = f"expected less than {longest:.3g} s: the engine counts steps up to 2^31"
+            raise unusable("run.longest_settling", message)
     _check_length(case, run, most)
     return run, _sources(run, case, reason)
 
