@@ -47,7 +47,7 @@ class Entry:
     kind
         ``run`` or ``sweep``.
     name
-        Name of the directory without the ending of unfinished runs, such as ``fig1b-5f7d8c66baa0``.
+        Name of the directory without the ending of unfinished runs, such as ``fig1b-06d1d8b89da8``.
     case
         Name of the case; of a sweep, of its base case.
     status
