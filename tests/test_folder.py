@@ -260,6 +260,19 @@ def test_a_removal_that_is_interrupted_leaves_the_case_until_the_end(out: Path) 
     assert [entry.name for entry in left] == ["case.json"]
 
 
+def test_a_replaced_run_is_removed_once_the_new_one_is_there(out: Path) -> None:
+    """Before, it is what the run is restored from."""
+    place = next(iter(finished_places(out).values()))
+    left = place.with_name(f"{place.name}.replaced")
+    place.rename(left)
+    assert left not in [removal.path for removal in unfinished_in(out)]
+    shutil.copytree(left, place)
+    removals = [removal for removal in unfinished_in(out) if removal.path == left]
+    assert len(removals) == 1
+    assert remove(removals) == {}
+    assert place.is_dir() and not left.exists()
+
+
 def test_a_lock_that_a_process_has_taken_since_stays(out: Path) -> None:
     lock = out / "gone-0123456789ab.lock"
     lock.touch()

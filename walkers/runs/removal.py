@@ -169,7 +169,7 @@ def _remove_run(directory: Path) -> str:
         if not ours:
             return _IN_PROGRESS
         on_disk.recover(place)
-        if not directory.is_symlink():
+        if directory.is_dir() and not directory.is_symlink():  # recovery removes what was replaced
             (directory / MANIFEST_NAME).unlink(missing_ok=True)
             _empty(directory, but=CASE_NAME)
         _remove_directory(directory)
