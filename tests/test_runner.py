@@ -57,6 +57,7 @@ from walkers.runner.failures import EngineNeverStarted
 from walkers.runner.launch import EngineReport, judge
 from walkers.runner.manifest import read_manifest, write_manifest
 from walkers.runs.making import make_runs
+from walkers.runs.names import find
 from walkers.templates.deck import RESTART_NAME, Deck, Segment, render_deck, whole
 
 PATIENCE_OF_LOCKS = "walkers.runner.directory._PATIENCE_SECONDS"
@@ -110,6 +111,17 @@ def test_a_run_is_found_by_its_directory_its_name_or_its_case_with_other_values_
         assert walkers.load(named, "runs", {"drive.frequency": "70 Hz"}).directory == Path(slower["run"])
         assert json.loads(call("run", named, *setting, "--json", check=True).stdout)["cached"]
     assert walkers.run(case_file, "runs").directory == walkers.run(first["run"]).directory == Path(first["run"])
+
+
+def test_a_run_with_other_values_belongs_beside_the_run(tmp_path: Path) -> None:
+    """Where its path says, whatever the folder of runs is; a changed case belongs in the folder of runs."""
+    first = run_case(make_case(run=BRIEF), tmp_path / "elsewhere").directory
+    changes = {"drive.frequency": "70 Hz"}
+    named = find(first, tmp_path / "runs", changes)
+    assert (named.kind, named.folder, named.finished_run) == ("run", first.parent, None)
+    assert find("fig1b", tmp_path / "runs", changes).folder == tmp_path / "runs"
+    second = run_case(named.case, named.folder).directory
+    assert walkers.load(first, tmp_path / "runs", changes).directory == second
 
 
 def test_a_running_simulation_is_looked_at_stopped_and_continued(in_folder: Path) -> None:

@@ -190,3 +190,13 @@ def test_the_height_that_is_asked_for_is_enough(count: int) -> None:
     height = re.search(r"expected (\S+ mm) or more", str(refusal.value))
     assert height is not None
     load_case("pile-ci", {"mixture.count": count, "boundary.height": height[1]})
+
+
+def test_walkers_stand_in_a_square_on_a_plane_and_in_a_row_in_a_channel() -> None:
+    """Places about the origin, row by row along x."""
+    plane = Boundary(material="glass")
+    assert sorted(plane.grid(2, 1.0)) == [(0.0, -0.5), (0.0, 0.5)]
+    rows = [x for x, _ in plane.grid(5, 1.0)]
+    assert sorted(set(rows)) == [-0.5, 0.5]
+    channel = Boundary(shape="channel", material="glass", width=4e-3)
+    assert sorted(channel.grid(3, 1.0)) == [(-1.0, 0.0), (0.0, 0.0), (1.0, 0.0)]

@@ -254,6 +254,9 @@ def test_keys_that_go_together_are_one_factor() -> None:
     expected: list[tuple[tuple[str, ...], list[list[Any]], list[Any]]] = [
         (both, [[0.1, 0.2], [0.2, 0.4], [0.3, 0.6]], [(both, [0.1, 0.2, 0.3], False)]),
         (both, [[0.1, 0.6], [0.2, 0.4], [0.3, 0.2]], [(both, [0.1, 0.2, 0.3], False)]),
+        # The second stays the same in a step, and tells fewer points apart than the first.
+        (both, [[0.1, 0.6], [0.2, 0.6], [0.3, 0.2]], [((wall,), [0.1, 0.2, 0.3], True), ((bead,), [0.2, 0.6], True)]),
+        (both, [[0.1, 0.2], [0.2, 0.2], [0.3, 0.6]], [((wall,), [0.1, 0.2, 0.3], True), ((bead,), [0.2, 0.6], True)]),
         (
             both,
             [[0.1, 0.4], [0.2, 0.2], [0.3, 0.6]],
@@ -285,16 +288,23 @@ def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> N
         assert axes.get_ylim()[0] < y.max()
         assert y.min() < axes.get_ylim()[1]
         assert np.interp(points, x, y) == pytest.approx(wanted, rel=5e-3)
-    far = {"runs'": [1e-3, 2e-3], "far above": [0.1, 0.2]}
-    (axes,) = _panels(
-        figure_of_table(
-            table_of(read_record(directory)),
-            predict=lambda cases, _: ({name: np.linspace(*ends, len(cases)) for name, ends in far.items()}, {}),
-        )
-    )
-    assert 100.0 < axes.get_ylim()[1] < 120.0
     with pytest.warns(LeftOutWarning, match="6 of 6 points: the theory has no orientation_end"):
         walkers.load(directory).figure(y="orientation_end", theory=True)
+
+
+@pytest.mark.parametrize(("far", "side"), [((0.1, 0.2), 1), ((-0.2, -0.1), 0)], ids=["above", "below"])
+def test_a_theory_far_from_the_runs_is_shown_up_to_its_nearer_end(
+    far: tuple[float, float], side: int, looked_through: Path
+) -> None:
+    """Of curves from 100 to 200 mm/s above or below runs of some mm/s, the end at 100 mm/s."""
+    curves = {"near": (1e-3, 2e-3), "far": far}
+    (axes,) = _panels(
+        figure_of_table(
+            table_of(read_record(looked_through / "grid")),
+            predict=lambda cases, _: ({name: np.linspace(*ends, len(cases)) for name, ends in curves.items()}, {}),
+        )
+    )
+    assert 100.0 < abs(axes.get_ylim()[side]) < 120.0
 
 
 @pytest.fixture(scope="module")

@@ -206,6 +206,30 @@ def test_a_box_is_the_same_from_a_mesh_from_planes_and_by_its_size(tmp_path: Pat
         assert case.boundary.cross_section == pytest.approx(cases[0].boundary.cross_section, rel=1e-9)
 
 
+def test_the_width_of_a_vessel_is_its_extent_along_x_or_y_whichever_is_larger(tmp_path: Path) -> None:
+    """Of a box 4 mm by 12 mm, turned either way."""
+    low = prism(4, 2e-3, 12e-3)
+    for stretch in ([1.0, 3.0, 1.0], [3.0, 1.0, 1.0]):
+        vessel = Vessel(low.points * stretch, low.triangles)
+        case = build_case(poured(mesh=write(tmp_path, vessel), scale="1 mm"))
+        assert case.boundary.width == pytest.approx(12e-3, rel=1e-9)
+
+
+def test_facets_move_with_the_vessel_in_the_frame_of_the_laboratory(tmp_path: Path) -> None:
+    """A bead that its bridge holds in a bowl stays there in both frames, while the bowl moves by 0.8 mm."""
+    mesh = write(tmp_path, bowl(5e-3, 4))
+    positions = []
+    for frame in ("container", "lab"):
+        tables = poured(mesh=mesh, scale="1 mm")
+        del tables["mixture"]
+        tables["placed"] = [{"radius": "0.3 mm", "at": ["0 mm", "0 mm", "0.5 mm"]}]
+        tables["drive"] = {"axis": "x", "frequency": "30 Hz", "peak_acceleration": "3 g", "frame": frame}
+        tables["run"] = {"duration": "0.2 s", "longest_settling": "0.02 s"}
+        positions.append(walkers.run(build_case(tables), tmp_path / frame).motion.position)
+    assert build_case(tables).excitation.amplitude > 0.8e-3
+    np.testing.assert_allclose(positions[0], positions[1], rtol=0, atol=1e-8)
+
+
 @pytest.mark.parametrize("name", ["a.stl", "a.ply", "a.vtk", "a.vtu", "a.msh", "a.off"])
 def test_a_run_is_named_by_the_numbers_of_its_vessel(tmp_path: Path, name: str) -> None:
     """Not by its file, whose format, name and place may be any; the case is whole without it."""
