@@ -374,7 +374,14 @@ def _sweep(folder: Path) -> Path:
     return walkers.sweep(folder / "angles.toml", folder / "runs").directory
 
 
-@pytest.mark.parametrize("make", [_short_run, _edited_deck, _sweep])
+@pytest.mark.parametrize(
+    "make",
+    [  # each compiles the contact model
+        _short_run,
+        pytest.param(_edited_deck, marks=pytest.mark.slow),
+        pytest.param(_sweep, marks=pytest.mark.slow),
+    ],
+)
 def test_the_commands_of_a_readme_repeat_the_run(make: Callable[[Path], Path], tmp_path: Path) -> None:
     """As they are printed: with LIGGGHTS alone by the script and by hand, and with the program."""
     (tmp_path / "made").mkdir()
