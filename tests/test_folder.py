@@ -230,7 +230,7 @@ def test_clean_holds_the_lock_and_takes_the_manifest_first(out: Path, monkeypatc
     removals = named_in(out, [first, second])
     with locked([second]):
         with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
-            patched.setattr("walkers.runs.removal._empty", _interrupted)
+            patched.setattr("walkers.runs.removal._remove_contents", _interrupted)
             remove(removals[:1])
         assert (first / "case.json").is_file() and not (first / MANIFEST_NAME).exists()
         assert first in [removal.path for removal in unfinished_in(out)]
@@ -241,9 +241,9 @@ def test_clean_holds_the_lock_and_takes_the_manifest_first(out: Path, monkeypatc
     assert not first.exists() and not second.exists()
 
 
-def _interrupted(directory: Path, *, but: str) -> None:
+def _interrupted(directory: Path, *, keep: str) -> None:
     """As a removal that is interrupted at its start; the lock of the run is held."""
-    assert (directory / but).is_file()
+    assert (directory / keep).is_file()
     assert directory.with_name(f"{directory.name}.lock").is_file()
     raise KeyboardInterrupt
 

@@ -171,15 +171,15 @@ def _remove_run(directory: Path) -> str:
         on_disk.recover(place)
         if directory.is_dir() and not directory.is_symlink():  # recovery removes what was replaced
             (directory / MANIFEST_NAME).unlink(missing_ok=True)
-            _empty(directory, but=CASE_NAME)
+            _remove_contents(directory, keep=CASE_NAME)
         _remove_directory(directory)
     return ""
 
 
-def _empty(directory: Path, *, but: str) -> None:
-    """Remove what a directory contains, without the entry of one name."""
+def _remove_contents(directory: Path, *, keep: str) -> None:
+    """Remove what a directory contains but the entry with a name."""
     for entry in sorted(directory.iterdir()):
-        if entry.name == but:
+        if entry.name == keep:
             continue
         if entry.is_dir() and not entry.is_symlink():
             shutil.rmtree(entry)
