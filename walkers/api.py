@@ -97,7 +97,7 @@ def load(reference: Given | Reference, out: str | Path = DEFAULT_OUT, changes: C
     True
     """
     named = find(reference, out, changes)
-    if named.means_case or named.kind == "case":
+    if named.kind == "case" or named.changes:
         run = _run_of_case(named)
     elif named.kind == "sweep":
         return Sweep(named.path)
@@ -106,7 +106,7 @@ def load(reference: Given | Reference, out: str | Path = DEFAULT_OUT, changes: C
     else:
         raise not_a_run(named.given, named.kind)
     if on_disk.is_finished(run.check().directory):
-        _ = run.result  # refuses a result that cannot be read
+        results.read(run.directory)  # refuses a result that cannot be read
     return run
 
 

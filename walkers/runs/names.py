@@ -54,7 +54,8 @@ class Reference:
     kind
         What it is, without the changes: changed, a run is another case.
     path
-        Where it is. The path of an unfinished run is its final directory; of a case without a file, the name.
+        Where it is: the final directory of a run that is not finished, the name of a shipped case, the folder ``out``
+        of a case that is given by itself.
     out
         Folder of the run directories.
     changes
