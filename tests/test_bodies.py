@@ -168,7 +168,7 @@ def test_a_flat_wall_is_named_by_the_side_on_which_it_stands(shape: str, walls: 
         outward = [("-", "", "+")[int(np.sign(-along)) + 1] for along in named[name][:2]]
         assert name == "".join(sign + axis for sign, axis in zip(outward, "xy", strict=True) if sign)
     if shape == "groove":  # a bead rests on both walls
-        place = (0.0, 0.0, boundary.rest_height(3e-4))
+        place = (0.0, 0.0, boundary.geometry.rest_height(3e-4))
         assert [place[2], *(np.dot(normal, place) for normal in named.values())] == pytest.approx([6e-4, 3e-4, 3e-4])
 
 

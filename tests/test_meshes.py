@@ -288,7 +288,7 @@ def test_beads_are_poured_into_a_jar_above_its_opening_alone(tmp_path: Path) -> 
     np.testing.assert_allclose(vessel.clearance(below), [1e-3, 4e-3], rtol=1e-9)
     case = build_case(poured(mesh=str(DATA / "jar-upright.stl"), scale="1 mm"))
     largest = max(case.mixture.radii) if case.mixture else 0.0
-    for layer in case.boundary.layers(largest, 0.0):
+    for layer in case.boundary.geometry.layers(largest, 0.0):
         if layer.level > 16e-3:
             assert np.abs(layer.places).max() < 4e-3
 

@@ -124,7 +124,7 @@ def test_a_container_holds_its_beads(shape: str, walls: int, tmp_path: Path) -> 
     case = small(boundary={"shape": shape, "width": "5 mm"}, run=run)
     motion = walkers.run(case, tmp_path).motion
     driven = motion.driven.position
-    room = case.boundary.side_clearance(driven.reshape(-1, 3)).reshape(driven.shape[:2]) - motion.radius
+    room = case.boundary.geometry.side_clearance(driven.reshape(-1, 3)).reshape(driven.shape[:2]) - motion.radius
     assert -1e-5 < room.min() < 0.05 * 2.5e-3
     assert driven[..., :2].std() > 0.2 * 2.5e-3
     held = [bridges.at_walls[0, bridges.at_walls[1] != FLOOR] for bridges in read_bridges(motion)]

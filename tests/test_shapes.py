@@ -97,19 +97,19 @@ def test_the_cross_section_of_a_container_is_that_between_its_walls(name: str) -
     boundary = boundary_of(name)
     line = (np.arange(400) + 0.5) / 400 * 4e-3 - 2e-3
     places = np.stack(np.meshgrid(line, line, 1e-3), axis=-1).reshape(-1, 3)
-    counted = (boundary.side_clearance(places) > 0.0).mean() * (4e-3) ** 2
-    assert boundary.cross_section == pytest.approx(counted, rel=2e-3)
-    assert boundary.volume(2e-3) == pytest.approx(2e-3 * counted, rel=2e-3)
+    counted = (boundary.geometry.side_clearance(places) > 0.0).mean() * (4e-3) ** 2
+    assert boundary.geometry.cross_section == pytest.approx(counted, rel=2e-3)
+    assert boundary.geometry.volume(2e-3) == pytest.approx(2e-3 * counted, rel=2e-3)
 
 
 @pytest.mark.parametrize("name", PRISMS)
 def test_beads_are_poured_from_places_within_the_walls(name: str) -> None:
     """Neighbours do not overlap, however they are displaced, and layers are one upon the other."""
     largest, boundary = 2e-4, boundary_of(name)
-    first, second = islice(boundary.layers(largest, 0.0), 2)
+    first, second = islice(boundary.geometry.layers(largest, 0.0), 2)
     places = np.array([(x, y, first.level) for x, y in first.places])
     assert len(places) > 20
-    assert (boundary.side_clearance(places) > largest).all()
+    assert (boundary.geometry.side_clearance(places) > largest).all()
     assert second.level - first.level == pytest.approx(2.06 * largest)
     distances = np.linalg.norm(places[:, None] - places, axis=-1) + np.eye(len(places))
     assert distances.min() - 2.0 * first.play(largest, largest) > 2.0 * largest * (1.0 - 1e-9)
@@ -119,7 +119,7 @@ def test_beads_are_poured_from_places_within_the_walls(name: str) -> None:
 def test_a_bead_at_rest_touches_the_boundary(name: str) -> None:
     """At the height at which it rests, the walls below it are a radius away."""
     boundary, radius = boundary_of(name), 3e-4
-    place = np.array([0.0, 0.0, boundary.rest_height(radius)])
+    place = np.array([0.0, 0.0, boundary.geometry.rest_height(radius)])
     touched = [wall for wall in boundary.walls if wall.distances(place) < 1.01 * radius]
     assert len(touched) == (2 if name == "groove" else 1)
     for wall in touched:
@@ -195,8 +195,8 @@ def test_the_height_that_is_asked_for_is_enough(count: int) -> None:
 def test_walkers_stand_in_a_square_on_a_plane_and_in_a_row_in_a_channel() -> None:
     """Places about the origin, row by row along x."""
     plane = Boundary(material="glass")
-    assert sorted(plane.grid(2, 1.0)) == [(0.0, -0.5), (0.0, 0.5)]
-    rows = [x for x, _ in plane.grid(5, 1.0)]
+    assert sorted(plane.geometry.grid(2, 1.0)) == [(0.0, -0.5), (0.0, 0.5)]
+    rows = [x for x, _ in plane.geometry.grid(5, 1.0)]
     assert sorted(set(rows)) == [-0.5, 0.5]
     channel = Boundary(shape="channel", material="glass", width=4e-3)
-    assert sorted(channel.grid(3, 1.0)) == [(-1.0, 0.0), (0.0, 0.0), (1.0, 0.0)]
+    assert sorted(channel.geometry.grid(3, 1.0)) == [(-1.0, 0.0), (0.0, 0.0), (1.0, 0.0)]

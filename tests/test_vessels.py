@@ -203,7 +203,7 @@ def test_a_box_is_the_same_from_a_mesh_from_planes_and_by_its_size(tmp_path: Pat
     assert cases[0].boundary.walls == cases[1].boundary.walls == cases[2].boundary.walls
     assert cases[1].determinants() == cases[2].determinants()
     for case in cases[1:]:
-        assert case.boundary.cross_section == pytest.approx(cases[0].boundary.cross_section, rel=1e-9)
+        assert case.boundary.geometry.cross_section == pytest.approx(cases[0].boundary.geometry.cross_section, rel=1e-9)
 
 
 def test_the_width_of_a_vessel_is_its_extent_along_x_or_y_whichever_is_larger(tmp_path: Path) -> None:
@@ -271,7 +271,7 @@ def test_files_of_one_vessel(tmp_path: Path, name: str) -> None:
     MESHES[name](1e3 * box.points, box.triangles).write(tmp_path / "other.vtk")
     found = build_case(poured(mesh=str(tmp_path / "other.vtk"), scale="1 mm")).boundary
     assert (found.walls, found.width, found.height) == (expected.walls, 5.3e-3, 12e-3)
-    np.testing.assert_allclose(found.volume(6e-3), 5.3e-3**2 * 6e-3, rtol=1e-9)
+    np.testing.assert_allclose(found.geometry.volume(6e-3), 5.3e-3**2 * 6e-3, rtol=1e-9)
 
 
 def test_beads_are_between_a_vessel_and_a_body_in_it(tmp_path: Path) -> None:
@@ -282,9 +282,9 @@ def test_beads_are_between_a_vessel_and_a_body_in_it(tmp_path: Path) -> None:
         body = cuboid(low, high, toward)
         both = Vessel(np.concatenate([box.points, body.points]), np.concatenate([box.triangles, 8 + body.triangles]))
         boundary = build_case(poured(mesh=write(tmp_path, both), scale="1 mm")).boundary
-        assert boundary.volume(4e-3) == pytest.approx(16e-6 * 4e-3 - np.prod(high - low), rel=1e-2)
+        assert boundary.geometry.volume(4e-3) == pytest.approx(16e-6 * 4e-3 - np.prod(high - low), rel=1e-2)
         places = np.array([[0.0, 0.0, 3.2e-3], [0.0, 0.0, 2.9e-3], [0.7e-3, 0.0, 2.5e-3]])
-        np.testing.assert_allclose(boundary.side_clearance(places), [2e-4, -1e-4, 2e-4], atol=1e-12)
+        np.testing.assert_allclose(boundary.geometry.side_clearance(places), [2e-4, -1e-4, 2e-4], atol=1e-12)
 
 
 def test_a_vessel_is_as_high_as_the_lowest_point_of_its_rim(tmp_path: Path) -> None:
@@ -294,7 +294,7 @@ def test_a_vessel_is_as_high_as_the_lowest_point_of_its_rim(tmp_path: Path) -> N
     height = 12e-3 - 0.5 * np.abs(points[:, 0]).max()
     boundary = build_case(poured(mesh=write(tmp_path, oblique), scale="1 mm")).boundary
     assert boundary.height == pytest.approx(height)
-    assert boundary.volume(2.0 * height) == pytest.approx(6.0 * (4e-3) ** 2 / sqrt(3.0) * height)
+    assert boundary.geometry.volume(2.0 * height) == pytest.approx(6.0 * (4e-3) ** 2 / sqrt(3.0) * height)
 
 
 def test_liquid_runs_out_at_the_lowest_point_of_a_rim() -> None:
@@ -382,7 +382,7 @@ def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
         assert vessel.height == pytest.approx(size)
         off.append(1.0 - vessel.volume() / (2.0 / 3.0 * pi * size**3))
         half = pi * (size / 2) ** 2 * (size - size / 6)
-        assert case.boundary.volume(size / 2) == pytest.approx(half, rel=3 * off[-1])
+        assert case.boundary.geometry.volume(size / 2) == pytest.approx(half, rel=3 * off[-1])
     assert off[1] / off[2] == pytest.approx(4.0, rel=0.1)
     walls = f"{len(vessel.triangles)} triangles in {len({*vessel.faces})} faces"
     opened = "(the mesh has 2048 triangles), open toward +z, 10 mm × 10 mm wide, 5 mm high"
@@ -397,7 +397,7 @@ def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
     ) / np.linalg.norm(away * [1.0, 1.0, 0.0] + [0.0, 0.0, 3.0] * np.abs(away), axis=1, keepdims=True)
     distances = np.array([wall.distances(centres) for wall in case.boundary.walls if wall.kind == "face"])
     np.testing.assert_allclose(distances.min(axis=0), size - near, atol=0.01 * size)
-    np.testing.assert_allclose(case.boundary.side_clearance(centres), distances.min(axis=0), atol=1e-12)
+    np.testing.assert_allclose(case.boundary.geometry.side_clearance(centres), distances.min(axis=0), atol=1e-12)
     assert (distances < np.inf).sum() / len(centres) == pytest.approx(1.0 / 0.9**2, rel=0.03)
 
 
@@ -411,7 +411,7 @@ def test_beads_are_poured_into_a_vessel_and_stay_there(tmp_path: Path, boundary:
         vessel = Vessel(points, np.concatenate([vessel.triangles, vessel.triangles[4:] + 6]))
     done = walkers.run(load_case(poured(mesh=write(tmp_path, vessel), scale="1 mm")), tmp_path)
     motion, walls = done.motion, done.case.boundary.walls
-    clear = done.case.boundary.side_clearance(motion.position[-1]) - motion.radius
+    clear = done.case.boundary.geometry.side_clearance(motion.position[-1]) - motion.radius
     assert (clear > -0.02 * motion.radius).all()
     bridges = list(read_bridges(motion))[-1]
     beads, numbers = bridges.at_walls

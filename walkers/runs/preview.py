@@ -45,7 +45,7 @@ def notes(case: Case) -> list[str]:
         return lines
     numbers = {"large": case.large, "small": case.count - case.large}
     lines += [f"no {name} beads; in the paper, large beads lead small ones" for name in numbers if not numbers[name]]
-    filled = _volume(case) / (_LOOSE_PACKING * case.boundary.cross_section)
+    filled = _volume(case) / (_LOOSE_PACKING * case.boundary.geometry.cross_section)
     room = 2.0 * case.boundary.inner_height - filled
     if not case.run.until and (fastest := room / case.duration) < _FASTEST_CLIMB:
         end = "rise above twice boundary.height, and end the run early"

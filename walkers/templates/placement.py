@@ -108,7 +108,7 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
     walking = sum(bool(body.facing) for _, _, body in bodies)
     spacing = max((walkers.spacing for case in cases for walkers in case.walkers), default=0.0)
     boundary = cases[0].boundary
-    grid = boundary.grid(walking, spacing) if walking else []
+    grid = boundary.geometry.grid(walking, spacing) if walking else []
     walkers: list[PlacedWalker] = []
     beads: list[Bead] = []
     for case, make, body in bodies:
@@ -129,7 +129,7 @@ def _room(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: f
     largest = max(max(case.radii) for case in cases)
     amplitude = max(case.excitation.farthest for case in cases)
     placed = [bead.at for case in cases for bead in case.placed]
-    return cases[0].boundary.room(
+    return cases[0].boundary.geometry.room(
         half_x=max([x for x, _ in grid] + [abs(x) for x, _, _ in placed], default=0.0) + far,
         half_y=max([y for _, y in grid] + [abs(y) for _, y, _ in placed], default=0.0) + far,
         height=10.0 * largest

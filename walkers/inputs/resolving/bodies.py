@@ -123,7 +123,7 @@ def mixture_of(draft: MixtureDraft, boundary: Boundary, notes: Notes) -> Mixture
         raise unusable("boundary.shape", 'expected a container, such as "box": a mixture is poured into it')
     count = table.count
     if count is None:
-        bed = boundary.volume(present(table.fill_height, "mixture.fill_height"))
+        bed = boundary.geometry.volume(present(table.fill_height, "mixture.fill_height"))
         _, volume_of_bead = share_and_volume(table, draft.small_radii, draft.large_radii)
         count = round(_PACKING * bed / volume_of_bead)
         if not 1 <= count <= MOST_BEADS:

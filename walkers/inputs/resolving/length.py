@@ -32,7 +32,7 @@ def limits_of(case: Setup) -> TimeStepLimits:
     bridged = [entry for body in case.bodies for entry in body.bridged]
     bridged += [(placed[-1], placed[:1]), (placed[0], placed[-1:])] if placed else []
     return time_step_limits(
-        [(*entry, case.boundary.damping(entry[0])) for entry in bridged],
+        [(*entry, case.boundary.geometry.damping(entry[0])) for entry in bridged],
         density=case.beads.density,
         youngs_modulus=contact.youngs_modulus,
         poissons_ratio=contact.poissons_ratio,

@@ -73,7 +73,7 @@ def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
         overlaps = [overlap * factor for overlap in resting]
         heading = atan2(y, x) + angle + (0.0 if facing > 0 else pi)
         pressed = zip(walkers.radii, overlaps, strict=False)  # the first overlaps are those with the floor
-        heights = [case.boundary.rest_height(radius - overlap) for radius, overlap in pressed]
+        heights = [case.boundary.geometry.rest_height(radius - overlap) for radius, overlap in pressed]
         ahead, left = cos(heading), sin(heading)
         beads = [
             StandingBead(along * ahead - aside * left, along * left + aside * ahead, *rest)
@@ -92,7 +92,7 @@ def _poured(case: Case, mixture: Mixture) -> Standing:
     """Beads on a loose lattice with random order and displacements (seed of the case); they fall and settle."""
     largest, draw = max(mixture.radii), default_rng(case.run.seed)
     floor, beads = _top_of_others(case), []
-    places = ((layer, x, y) for layer in case.boundary.layers(largest, floor) for x, y in layer.places)
+    places = ((layer, x, y) for layer in case.boundary.geometry.layers(largest, floor) for x, y in layer.places)
     for radius, (layer, x, y) in zip((float(size) for size in draw.permutation(mixture.all_radii)), places):  # noqa: B905
         shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * layer.play(radius, largest)
         beads.append(StandingBead(x + float(shift[0]), y + float(shift[1]), floor + layer.level, radius))
@@ -150,7 +150,7 @@ class _Held(NamedTuple):
 def _held(case: Case) -> list[_Held]:
     """The beads of walkers, then those that are placed."""
     keys = [key for key, walkers in case.walkers_by_key.items() for _ in range(walkers.replicates)]
-    grid = case.boundary.grid(len(keys), max(walkers.spacing for walkers in case.walkers)) if keys else []
+    grid = case.boundary.geometry.grid(len(keys), max(walkers.spacing for walkers in case.walkers)) if keys else []
     beads: list[_Held] = []
     for number, (key, (x, y), (_, walker)) in enumerate(zip(keys, grid, standing(case), strict=False)):
         beads += [_Held(key, (x + bead.x, y + bead.y, bead.z), bead.radius, number) for bead in walker.beads]
@@ -160,7 +160,7 @@ def _held(case: Case) -> list[_Held]:
 def _cut_by_walls(case: Case, beads: list[_Held]) -> list[_Held]:
     """The beads that side walls cut, and those of walkers that stand beside the floor of a vessel."""
     places = np.array([bead.place for bead in beads])
-    clearances = case.boundary.side_clearance(places)
+    clearances = case.boundary.geometry.side_clearance(places)
     if case.walkers:
         clearances = np.where(np.isfinite(case.boundary.walls[0].distances(places)), clearances, -1.0)
     return [bead for bead, clear in zip(beads, clearances, strict=True) if clear < (1.0 - OVERLAP) * bead.radius]

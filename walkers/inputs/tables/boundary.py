@@ -8,13 +8,13 @@ from functools import lru_cache
 from math import cos, degrees, sin
 from typing import Annotated, Any
 
-from walkers.arrays import FloatArray, Vector
+from walkers.arrays import Vector
 from walkers.errors import Problem
 from walkers.inputs import units
 from walkers.inputs.config_table import SAME_RUN, Derived, Indirect, Table, key, present, within
 from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.tables.shapes.registry import SHAPES, ShapeName
-from walkers.inputs.tables.shapes.shape import Layer, Shape
+from walkers.inputs.tables.shapes.shape import Shape
 from walkers.inputs.tables.shapes.vessel import GIVEN_BY, Plane, VesselShape
 from walkers.inputs.tables.shapes.walls import Wall
 
@@ -119,46 +119,6 @@ class Boundary(Table):
         """The acceleration of gravity in the boundary's frame, m/s², of a magnitude (m/s²)."""
         down, press = gravity * _round(sin(self.tilt)), gravity * _round(cos(self.tilt))
         return (-down * _round(cos(self.uphill)), -down * _round(sin(self.uphill)), -press)
-
-    def damping(self, radius: float) -> float:
-        """Damping of a bead by the walls that it touches over that by one (`Shape.damping`)."""
-        return self.geometry.damping(radius)
-
-    def room(
-        self,
-        half_x: float,
-        half_y: float,
-        height: float,
-        margin: float,
-        largest: float,
-    ) -> tuple[Vector, Vector]:
-        """Corners of the simulation box, m (`Shape.room`)."""
-        return self.geometry.room(half_x, half_y, height, margin, largest)
-
-    def side_clearance(self, places: FloatArray) -> FloatArray:
-        """Distance of places (n, 3) from the nearest side wall, (n,), m (`Shape.side_clearance`)."""
-        return self.geometry.side_clearance(places)
-
-    def grid(self, number: int, spacing: float) -> list[tuple[float, float]]:
-        """Places about the origin for walkers that stand ``spacing`` (m) apart (`Shape.grid`)."""
-        return self.geometry.grid(number, spacing)
-
-    def rest_height(self, radius: float) -> float:
-        """Height of the centre of a bead of a radius (m) that rests above the origin, m."""
-        return self.geometry.rest_height(radius)
-
-    @property
-    def cross_section(self) -> float:
-        """Inner cross-section of a container, m²; of a vessel of the user's own, its mean."""
-        return self.geometry.cross_section
-
-    def volume(self, level: float) -> float:
-        """Volume of a container below a level (m), m³."""
-        return self.geometry.volume(level)
-
-    def layers(self, largest: float, floor: float) -> Iterator[Layer]:
-        """Layers of places from which beads up to a radius are poured above a height, m."""
-        return self.geometry.layers(largest, floor)
 
 
 @lru_cache(maxsize=16)  # the surface of a mesh takes seconds

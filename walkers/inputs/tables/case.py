@@ -186,7 +186,7 @@ class Setup(CaseFile):
         both = [walkers for walkers in self.walkers if walkers.facing == "both"]
         if not self.meets or all(isclose(walkers.angle_spread, pi) for walkers in both):
             return 0
-        rows = [x for x, _ in self.boundary.grid(sum(walkers.replicates for walkers in self.walkers), 1.0)]
+        rows = [x for x, _ in self.boundary.geometry.grid(sum(walkers.replicates for walkers in self.walkers), 1.0)]
         length = rows.count(rows[0])
         return length if length % 2 == 0 and length < len(rows) else 0
 

@@ -40,7 +40,7 @@ def derived(case: Case) -> dict[str, float]:
     """Coverage, rounded to three digits so that equal trays form one group in figures."""
     boundary, spacing = case.boundary, max(make.spacing for make in case.walkers)
     cell = spacing * (boundary.width or spacing)
-    floor = boundary.cross_section if boundary.closed else cell * sum(make.replicates for make in case.walkers)
+    floor = boundary.geometry.cross_section if boundary.closed else cell * sum(make.replicates for make in case.walkers)
     return {"coverage": float(f"{pi * sum(radius**2 for radius in case.all_radii) / floor:.3g}")}
 
 

@@ -313,7 +313,7 @@ def paths_figure(case: Case, tables: Tables) -> Figure:
     if case.boundary.closed:
         edge = np.linspace(-0.55, 0.55, 221) * case.boundary.inner_width
         places = np.stack(np.meshgrid(edge, edge, case.boundary.inner_height / 2.0), axis=-1)[:, :, 0]
-        inside = case.boundary.side_clearance(places.reshape(-1, 3)).reshape(places.shape[:2])
+        inside = case.boundary.geometry.side_clearance(places.reshape(-1, 3)).reshape(places.shape[:2])
         axes.contour(1e3 * edge, 1e3 * edge, inside, levels=[0.0], colors=[_GREY], linewidths=1.0)
     axes.set_aspect("equal")
     axes.margins(0.08)
