@@ -12,7 +12,9 @@ sys.path[:0] = [str(HERE.parent), str(HERE / "_ext")]
 
 from walkers.runner.failures import UnauditedEngineWarning  # noqa: E402
 
-warnings.simplefilter("ignore", UnauditedEngineWarning)  # an example's engine may never have been audited
+warnings.simplefilter(
+    "ignore", UnauditedEngineWarning
+)  # an example's engine may never have been audited
 
 project = "granular-walkers"
 author = "the authors of granular-walkers"
@@ -42,7 +44,9 @@ html_static_path = ["_static"]
 html_css_files = ["walkers.css"]
 html_show_sourcelink = False
 html_copy_source = False
-html_show_search_summary = False  # a browser may not read other pages from disk: docs/_ext/texts.py instead
+html_show_search_summary = (
+    False  # a browser may not read other pages from disk: docs/_ext/texts.py instead
+)
 html_search_scorer = str(HERE / "_static" / "scorer.js")
 html_theme_options = {
     "navbar_align": "left",

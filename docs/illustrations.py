@@ -42,7 +42,14 @@ from walkers.files import read_json, write_bytes, write_json
 from walkers.inputs.sweep import Sweep, load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.results import VERSION, modules_of
-from walkers.postprocess.show.drawing import TWO_COLUMNS, legend_below, letter_panels, new_figure, save_figure, styled
+from walkers.postprocess.show.drawing import (
+    TWO_COLUMNS,
+    legend_below,
+    letter_panels,
+    new_figure,
+    save_figure,
+    styled,
+)
 from walkers.second_engine.lines import as_dict, failures, run_checks
 from walkers.sweeps.climbing import texts_of
 from walkers.sweeps.scheduler import Options
@@ -54,7 +61,9 @@ if TYPE_CHECKING:
 RECORD = Path("figures") / "made-from.json"
 CHECKED = Path("figures") / "validation.json"
 """Lines of ``python -m studies.literature``, of which pages quote numbers."""
-_BLOCK = re.compile(r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n).*?(?=^```)")
+_BLOCK = re.compile(
+    r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n).*?(?=^```)"
+)
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->[^<]*<!--/fact-->")
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
 _PILES = ("pile-starts", "pile-frictions", "pile-contacts", "pile-paper")
@@ -111,11 +120,15 @@ def _shipped(*names: str, changes: Changes = None) -> Callable[[], Iterable[Case
     return lambda: [load_case(name, changes) for name in names]
 
 
-def _picture(name: str, case: str, changes: Changes = None, film: Changes = None, walker: int | None = None) -> None:
+def _picture(
+    name: str, case: str, changes: Changes = None, film: Changes = None, walker: int | None = None
+) -> None:
     """A picture of one run, or of one walker in it, as `walkers render` makes it, or a film."""
     file = f"pictures/{name}"
 
-    @_illustration(Path(name).stem if not film else "film", file, cases=_shipped(case, changes=changes))
+    @_illustration(
+        Path(name).stem if not film else "film", file, cases=_shipped(case, changes=changes)
+    )
     def make(out: Path, docs: Path) -> None:
         done = run(load_case(case, changes), out)
         done.film(docs / file, **film) if film else done.render(docs / file, walker=walker)
@@ -141,12 +154,20 @@ _of_paper("comparison", "figures/comparison.md", "figures/comparison.json", swee
 
 _BY_FRICTION = {"x": "contact.friction.bead_wall", "y": "axial_velocity", "hue": "liquid.name"}
 _SWEEPS: Mapping[str, tuple[Mapping[str, str], Callable[[Any], list[dict[str, str]]] | None]] = {
-    "climb-liquids": ({**_BY_FRICTION, "panels": "contact.roughness.bead_wall"}, tables.least_frictions),
+    "climb-liquids": (
+        {**_BY_FRICTION, "panels": "contact.roughness.bead_wall"},
+        tables.least_frictions,
+    ),
     "climb-corner": (_BY_FRICTION, tables.least_frictions),
     "zoo": ({"y": "axial_velocity", "hue": "none"}, None),
     "zoo-corner": ({"y": "axial_velocity"}, None),
     "tray-phases": (
-        {"x": "drive.peak_acceleration", "y": "clustered_share", "hue": "walkers", "panels": "coverage"},
+        {
+            "x": "drive.peak_acceleration",
+            "y": "clustered_share",
+            "hue": "walkers",
+            "panels": "coverage",
+        },
         tables.means_of_trays,
     ),
 }
@@ -171,7 +192,12 @@ def mark_upright(figure: Figure, table: pd.DataFrame) -> None:
         "none upright": ("none", shares == 0.0),
     }
     for label, (fill, of_kind) in kinds.items():
-        look = {"fillstyle": fill, "markerfacecoloralt": "white", "markersize": 6.0, "clip_on": False}
+        look = {
+            "fillstyle": fill,
+            "markerfacecoloralt": "white",
+            "markersize": 6.0,
+            "clip_on": False,
+        }
         axes.plot(places[of_kind], heights[of_kind], "ko", label=label, zorder=3, **look)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
 
@@ -188,7 +214,9 @@ def _of_sweep(name: str) -> None:
             mark_upright(figure, done.table())
         save_figure(figure, docs / files[0], [point.directory.name for point in done.runs])
         if rows:
-            write_bytes(docs / files[1], tables.page(f"walkers list {name}", rows(done.table())).encode())
+            write_bytes(
+                docs / files[1], tables.page(f"walkers list {name}", rows(done.table())).encode()
+            )
 
 
 for _name in _SWEEPS:
@@ -196,17 +224,28 @@ for _name in _SWEEPS:
 
 
 @_illustration(
-    "pile-climbs", "figures/pile-climbs.png", "figures/pile-climbs.md", cases=_cases(*_PILES), versions=_OF_PILES
+    "pile-climbs",
+    "figures/pile-climbs.png",
+    "figures/pile-climbs.md",
+    cases=_cases(*_PILES),
+    versions=_OF_PILES,
 )
 def _make_climbs(out: Path, docs: Path) -> None:
-    climbs = climb([sweep(name, out).directory for name in _PILES], to=docs / "figures" / "pile-climbs.png")
+    climbs = climb(
+        [sweep(name, out).directory for name in _PILES], to=docs / "figures" / "pile-climbs.png"
+    )
     rows = [{name: texts[name] for name in _OF_CLIMBS} for texts in map(texts_of, climbs)]
-    write_bytes(docs / "figures" / "pile-climbs.md", tables.page(f"walkers climb {' '.join(_PILES)}", rows).encode())
+    write_bytes(
+        docs / "figures" / "pile-climbs.md",
+        tables.page(f"walkers climb {' '.join(_PILES)}", rows).encode(),
+    )
 
 
 @_illustration("unexplained", "figures/unexplained.md", cases=_shipped("fig1b", "fig4a", "fig4b"))
 def _make_effects(_: Path, docs: Path) -> None:
-    write_bytes(docs / "figures" / "unexplained.md", tables.page(effects.COMMAND, effects.rows()).encode())
+    write_bytes(
+        docs / "figures" / "unexplained.md", tables.page(effects.COMMAND, effects.rows()).encode()
+    )
 
 
 _CHECKED_CASES = _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci")
@@ -216,7 +255,12 @@ _CHECKED_CASES = _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer",
 def _make_validation(out: Path, docs: Path) -> None:
     lines = run_checks(LITERATURE, out)
     write_json(docs / CHECKED, as_dict(lines))
-    save_figure(_benchmarks(), docs / "figures" / "benchmarks.png", (), title="Published benchmarks of impacts")
+    save_figure(
+        _benchmarks(),
+        docs / "figures" / "benchmarks.png",
+        (),
+        title="Published benchmarks of impacts",
+    )
     for line in failures(lines):
         print(f"walkers: not as expected: {line.check}: {line.quantity}", file=sys.stderr)
 
@@ -240,7 +284,9 @@ def _benchmarks() -> Figure:
 @_illustration("others", "figures/others.png", cases=_shipped("symmetric"))
 def _make_others(_: Path, docs: Path) -> None:
     with experiments.workbench() as bench:
-        save_figure(_experiments(bench), docs / "figures" / "others.png", (), title="Experiments of others")
+        save_figure(
+            _experiments(bench), docs / "figures" / "others.png", (), title="Experiments of others"
+        )
 
 
 @styled
@@ -252,13 +298,26 @@ def _experiments(bench: Bench) -> Figure:
     curves = np.array([experiments.modelled(phase) for phase in fine])
     for number, strength in enumerate(experiments.STRENGTHS):
         phases.plot(at, drifts[:, number], "o", mfc="none", ms=4.0, color=f"C{number}")
-        phases.plot(fine, curves[:, number], lw=1.0, color=f"C{number}", label=f"a = {strength:g} · 7/2 μg")
-    phases.plot(fine, [experiments.weak(phase) for phase in fine], "k--", lw=1.0, label="weak friction")
+        phases.plot(
+            fine, curves[:, number], lw=1.0, color=f"C{number}", label=f"a = {strength:g} · 7/2 μg"
+        )
+    phases.plot(
+        fine, [experiments.weak(phase) for phase in fine], "k--", lw=1.0, label="weak friction"
+    )
     for number, phase in enumerate((0.0, 90.0)):
         of, curve = (
-            -rows[list(places).index(phase)] * experiments.STRENGTHS for rows, places in ((drifts, at), (curves, fine))
+            -rows[list(places).index(phase)] * experiments.STRENGTHS
+            for rows, places in ((drifts, at), (curves, fine))
         )
-        strengths.plot(experiments.STRENGTHS, of, "o", mfc="none", ms=4.0, color=f"C{number}", label=f"{phase:g}°")
+        strengths.plot(
+            experiments.STRENGTHS,
+            of,
+            "o",
+            mfc="none",
+            ms=4.0,
+            color=f"C{number}",
+            label=f"{phase:g}°",
+        )
         strengths.plot(experiments.STRENGTHS, curve, lw=1.0, color=f"C{number}")
     for label, how in (
         ("70 GPa", {}),
@@ -269,7 +328,13 @@ def _experiments(bench: Bench) -> Figure:
         impacts.plot(1.0 / stokes[:, 2], e[:, 2], "o-", mfc="none", ms=4.0, lw=1.0, label=label)
     inverse = np.array([0.0, 1.0 / stokes[:, 2].min()])
     loss = np.log(experiments.FILM / experiments.ROUGH) * inverse
-    impacts.plot(inverse, experiments.RESTITUTION * (1.0 - loss), "k--", lw=1.0, label="lubrication, approach")
+    impacts.plot(
+        inverse,
+        experiments.RESTITUTION * (1.0 - loss),
+        "k--",
+        lw=1.0,
+        label="lubrication, approach",
+    )
     phases.set(xlabel="phase of the second tone (°)", ylabel="drift / speed of the first tone")
     strengths.set(xlabel="a/(7/2 μg)", ylabel="drift / (7/2 μg/ω)")
     impacts.set(xlabel="1/St", ylabel="restitution", ylim=(0.0, 1.0), xticks=(0.0, 0.005, 0.01))
@@ -285,7 +350,9 @@ _CALIBRATED = {
 }
 
 
-@_illustration("calibration", *_CALIBRATED, cases=lambda: load_calibration("ruby").sweep("ruby").cases())
+@_illustration(
+    "calibration", *_CALIBRATED, cases=lambda: load_calibration("ruby").sweep("ruby").cases()
+)
 def _make_calibration(out: Path, docs: Path) -> None:
     write_outcome(calibrate(load_calibration("ruby"), out, Options()), out / "ruby")
     for file, name in _CALIBRATED.items():
@@ -313,7 +380,11 @@ def stale(docs: Path) -> dict[str, list[str]]:
     record, old = read_json(docs / RECORD), {}
     for name, illustration in ILLUSTRATIONS.items():
         today = digest(illustration)
-        old[name] = [file for file in illustration.files if record.get(file) != today or not (docs / file).is_file()]
+        old[name] = [
+            file
+            for file in illustration.files
+            if record.get(file) != today or not (docs / file).is_file()
+        ]
     return {name: files for name, files in old.items() if files}
 
 
@@ -324,7 +395,9 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
     """
     for name in only:
         if name not in ILLUSTRATIONS:
-            raise InputError("illustrations", [Problem("", name, f"expected one of {', '.join(ILLUSTRATIONS)}")])
+            raise InputError(
+                "illustrations", [Problem("", name, f"expected one of {', '.join(ILLUSTRATIONS)}")]
+            )
     written = []
     for name in only or stale(docs):
         print(f"walkers: {name}", file=sys.stderr)
@@ -345,7 +418,11 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
 
 def pages_of(docs: Path) -> list[Path]:
     """README, the article and all pages of the documentation."""
-    return [docs.parent / "README.md", docs.parent / "studies" / "article.md", *sorted(docs.rglob("*.md"))]
+    return [
+        docs.parent / "README.md",
+        docs.parent / "studies" / "article.md",
+        *sorted(docs.rglob("*.md")),
+    ]
 
 
 def facts(docs: Path) -> dict[str, str]:
@@ -355,7 +432,9 @@ def facts(docs: Path) -> dict[str, str]:
     values = {fact["name"]: fact["values"][shipped] for fact in compared["facts"]}
     numbers = {name: f"{value:.3g}" for name, value in values.items() if value is not None}
     numbers["agree"] = f"{counted['agree']} of {counted['of']}"
-    numbers["threshold"] = f"{np.mean([list(row.values())[1:3] for row in compared['thresholds']]):.2f}"
+    numbers["threshold"] = (
+        f"{np.mean([list(row.values())[1:3] for row in compared['thresholds']]):.2f}"
+    )
     by_frequency = {row["of"]: row["by_frequency"] for row in compared["curve"]}
     numbers["by_frequency_5g"] = f"{by_frequency['Fig. 2, 5 g']:.2f}"
     checked = read_json(docs / CHECKED)["lines"]
@@ -370,16 +449,30 @@ def _of_checks(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:
         name = "_".join(re.findall(r"\w+", f"{line['check']} {line['quantity']}".lower()))
         numbers |= {name: f"{line['measured']:.4g}", f"{name}_expected": f"{line['expected']:.4g}"}
     for check in LITERATURE:
-        judged = [line for line in lines if line["check"] == check and line["tolerance"] is not None]
+        judged = [
+            line for line in lines if line["check"] == check and line["tolerance"] is not None
+        ]
         passed = sum(line["verdict"] == "pass" for line in judged)
         numbers[f"{check}_pass"] = f"{passed} of {len(judged)}"
-        for test in sorted({line["quantity"][0] for line in judged} if check == "benchmarks" else ()):
-            shares = [line["error"] / line["tolerance"] for line in judged if line["quantity"].startswith(test)]
+        for test in sorted(
+            {line["quantity"][0] for line in judged} if check == "benchmarks" else ()
+        ):
+            shares = [
+                line["error"] / line["tolerance"]
+                for line in judged
+                if line["quantity"].startswith(test)
+            ]
             numbers[f"benchmarks_{test}"] = f"{100.0 * max(shares):.0f}"
     crossed = [line for line in lines if line["check"] == "crosscheck"]
     walked = [line["error"] for line in crossed if line["quantity"].endswith(": velocity")]
-    apart = [line["measured"] for line in crossed if line["quantity"].endswith(": largest distance of a bead")]
-    cycles = [line["measured"] for line in crossed if re.search("start .*: cycles", line["quantity"])]
+    apart = [
+        line["measured"]
+        for line in crossed
+        if line["quantity"].endswith(": largest distance of a bead")
+    ]
+    cycles = [
+        line["measured"] for line in crossed if re.search("start .*: cycles", line["quantity"])
+    ]
     return {
         **numbers,
         "crosscheck_velocity": f"{max(walked):.1g}",
@@ -390,7 +483,9 @@ def _of_checks(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:
 
 def refreshed(page: str, numbers: Mapping[str, str], printed: Callable[[str], str]) -> str:
     """The text of a page with the current numbers, and with what its commands print."""
-    page = _FACT.sub(lambda fact: f"<!--fact {fact['name']}-->{numbers[fact['name']]}<!--/fact-->", page)
+    page = _FACT.sub(
+        lambda fact: f"<!--fact {fact['name']}-->{numbers[fact['name']]}<!--/fact-->", page
+    )
     return _BLOCK.sub(lambda block: block["head"] + printed(block["command"]), page)
 
 
@@ -402,7 +497,9 @@ def output_of(command: str, out: Path) -> str:
     """What a command on a case prints; runs are in ``runs``, wherever that is."""
     _, name, *arguments = shlex.split(command)
     if "--theory" in arguments:
-        run(next(word for word in arguments if not word.startswith("-")), out)  # which it prints beside the models
+        run(
+            next(word for word in arguments if not word.startswith("-")), out
+        )  # which it prints beside the models
     words = [sys.executable, "-m", "walkers.main", name, *arguments, "--out", str(out)]
     words += ["--force"] if name == "run" else []  # else it says that it was run already
     printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout

@@ -12,16 +12,27 @@ import pandas as pd
 
 _FRICTION = "contact.friction.bead_wall"
 _LIQUIDS = {"liquid.name": "{}", "contact.roughness.bead_wall": "{:g} um"}
-_OF_TRAYS = ["merged", "parted", "clustered_share", "largest_cluster", "slow_share", "nematic_order", "speed_ratio"]
+_OF_TRAYS = [
+    "merged",
+    "parted",
+    "clustered_share",
+    "largest_cluster",
+    "slow_share",
+    "nematic_order",
+    "speed_ratio",
+]
 
 
 def means_of_trays(table: pd.DataFrame) -> list[dict[str, str]]:
     """Means ± standard deviations over the seeds of the sweep `tray-phases`, and the sums of the meetings."""
     percent = (100.0 * table["coverage"]).round()
     seeds = table.groupby([table["walkers"], percent, table["drive.peak_acceleration"]])[_OF_TRAYS]
-    texts = (seeds.mean().map("{:.2g}".format) + " ± " + seeds.std().map("{:.2g}".format)).replace("nan ± nan", "–")
+    texts = (seeds.mean().map("{:.2g}".format) + " ± " + seeds.std().map("{:.2g}".format)).replace(
+        "nan ± nan", "–"
+    )
     rows = [
-        {"tray": "{} walkers, {:g} % covered, {:g} g".format(*key), **row} for key, row in texts.T.to_dict().items()
+        {"tray": "{} walkers, {:g} % covered, {:g} g".format(*key), **row}
+        for key, row in texts.T.to_dict().items()
     ]
     sums = table[_OF_TRAYS[:2]].sum().astype(int).map(str).to_dict()
     return [*rows, {"tray": "all", **dict.fromkeys(_OF_TRAYS, "–"), **sums}]
@@ -34,11 +45,21 @@ def least_frictions(table: pd.DataFrame) -> list[dict[str, str]]:
     """
     rows = []
     for _, some in table.groupby([name for name in _LIQUIDS if name in table], sort=False):
-        friction, speed = some.sort_values(_FRICTION)[[_FRICTION, "axial_velocity"]].dropna().to_numpy().T
+        friction, speed = (
+            some.sort_values(_FRICTION)[[_FRICTION, "axial_velocity"]].dropna().to_numpy().T
+        )
         last = np.flatnonzero(speed <= 0.0)[-1]
         least = np.interp(0.0, speed[last : last + 2], friction[last : last + 2])
-        cluster = ", ".join(text.format(some[name].iloc[0]) for name, text in _LIQUIDS.items() if name in some)
-        rows.append({"cluster": cluster, "climbs from": f"{least:.2f}", "fastest (mm/s)": f"{1e3 * speed.max():.2g}"})
+        cluster = ", ".join(
+            text.format(some[name].iloc[0]) for name, text in _LIQUIDS.items() if name in some
+        )
+        rows.append(
+            {
+                "cluster": cluster,
+                "climbs from": f"{least:.2f}",
+                "fastest (mm/s)": f"{1e3 * speed.max():.2g}",
+            }
+        )
     return rows
 
 
@@ -50,17 +71,27 @@ def page(command: str, rows: Sequence[Mapping[str, str]]) -> str:
 def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A table of Markdown."""
     cells = ([cell.replace("|", "\\|").replace("\n", " ") for cell in row] for row in rows)
-    return "\n".join(f"| {' | '.join(line)} |" for line in (heads, ["---"] * len(heads), *cells)) + "\n"
+    return (
+        "\n".join(f"| {' | '.join(line)} |" for line in (heads, ["---"] * len(heads), *cells))
+        + "\n"
+    )
 
 
 def cells(folder: Path) -> Iterator[tuple[str, str]]:
     """Names and texts of all cells of the pages that `page` wrote: of the file, the row and the column."""
     for file in sorted(folder.glob("*.md")):
         lines = [
-            line.strip("| ").split(" | ") for line in file.read_text("utf-8").splitlines() if line.startswith("| ")
+            line.strip("| ").split(" | ")
+            for line in file.read_text("utf-8").splitlines()
+            if line.startswith("| ")
         ]
-        for row in lines[2:] if file.read_text("utf-8").startswith(("# walkers ", "# python ")) else ():
-            yield from ((_name(file.stem, row[0], column), text) for column, text in zip(lines[0], row, strict=True))
+        for row in (
+            lines[2:] if file.read_text("utf-8").startswith(("# walkers ", "# python ")) else ()
+        ):
+            yield from (
+                (_name(file.stem, row[0], column), text)
+                for column, text in zip(lines[0], row, strict=True)
+            )
 
 
 def _name(*words: str) -> str:
@@ -75,8 +106,14 @@ def of_calibration(record: Mapping[str, Any]) -> dict[str, str]:
         for row in record["observations"]:
             numbers[_name("calibration", name, row["name"])] = _short(row["numbers"][name])
     intervals = {f"posterior {name}": ends for name, ends in record["posterior"].items()}
-    intervals |= {f"predicted {row['name']}": row["predicted"] for row in record["observations"] if row["predicted"]}
-    texts = {name: "{1} ({0} to {2})".format(*map(_short, ends)) for name, ends in intervals.items()}
+    intervals |= {
+        f"predicted {row['name']}": row["predicted"]
+        for row in record["observations"]
+        if row["predicted"]
+    }
+    texts = {
+        name: "{1} ({0} to {2})".format(*map(_short, ends)) for name, ends in intervals.items()
+    }
     return numbers | {_name("calibration", name): text for name, text in texts.items()}
 
 

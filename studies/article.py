@@ -91,7 +91,13 @@ def _printed(html: Path) -> bytes:
     """A page as PDF."""
     with tempfile.TemporaryDirectory() as work:
         pdf = Path(work) / "article.pdf"
-        command = ["chromium", "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer"]
+        command = [
+            "chromium",
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--no-pdf-header-footer",
+        ]
         command += [f"--print-to-pdf={pdf}", html.resolve().as_uri()]
         subprocess.run(command, check=True, capture_output=True)
         return pdf.read_bytes()

@@ -26,7 +26,9 @@ COMMAND = "python -m studies.effects"
 app = new_app(COMMAND)
 
 _STEPS = 512  # per cycle; 2048 change velocities by less than 0.01 mm/s
-_LIFT = sqrt(140.0)  # a sphere under the load N rolls at h = 140 R (η U R/N)² in a liquid that cavitates
+_LIFT = sqrt(
+    140.0
+)  # a sphere under the load N rolls at h = 140 R (η U R/N)² in a liquid that cavitates
 _EDGES = 4.70 * 1.682 / 2.0
 """Drag of the edge of a bridge over 2 r_w γ Ca^⅔: 4.70 γ Ca^⅔ per length of front and rear together, along the normal
 of an edge that moves at U cos φ; the integral of cos^(5/3) φ over half of it is 1.682."""
@@ -35,7 +37,10 @@ _SHOWN = 0.05  # m/s, of the column of sizes
 _PEAKS = (2, 3, 5, 6, 10)
 _CASES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
     **{
-        f"{peak} g, {hertz} Hz": ("fig1b", {"drive.peak_acceleration": f"{peak} g", "drive.frequency": f"{hertz} Hz"})
+        f"{peak} g, {hertz} Hz": (
+            "fig1b",
+            {"drive.peak_acceleration": f"{peak} g", "drive.frequency": f"{hertz} Hz"},
+        )
         for peak in _PEAKS
         for hertz in (60, 90)
     },
@@ -55,7 +60,10 @@ class Effect:
     edges: tuple[float, float] = (0.0, 0.0)  # drags on the substrate and on beads, as `_EDGES`
     merged: bool = False  # the bridges of both beads to the substrate
     asperities: float = 0.0  # sliding resistance of flows between asperities over 3πηR
-    friction: tuple[float, float] = (1.0, 1.0)  # factors on that of beads with the substrate, and with each other
+    friction: tuple[float, float] = (
+        1.0,
+        1.0,
+    )  # factors on that of beads with the substrate, and with each other
     changes: Mapping[str, Any] = field(default_factory=dict)  # of keys of the cases
 
 
@@ -89,7 +97,9 @@ def _parts(case: Case, effect: Effect) -> tuple[FloatArray, FloatArray]:
     """Parameters of `acts` for a case, and losses of the loads of its contacts, in units of 4πγR̄."""
     dimer, liquid, loads = dimer_of(case), case.liquid.of_bridges, contact_loads(case)
     tension, radii, curved = liquid.surface_tension, np.array(dimer.radii), _curved(case)
-    wetted = (4.0 * curved * [load.surfaces.volume for load in loads] / pi) ** 0.25  # r_w of the law
+    wetted = (
+        4.0 * curved * [load.surfaces.volume for load in loads] / pi
+    ) ** 0.25  # r_w of the law
     on_bead = wetted[:2] + wetted[2]
     above = effect.lifted_above or np.inf
     lifts = _LIFT * liquid.viscosity * curved * np.sqrt(curved / above)
@@ -97,7 +107,9 @@ def _parts(case: Case, effect: Effect) -> tuple[FloatArray, FloatArray]:
     edges = np.array(effect.edges)[:, None] * [wetted[:2], on_bead]
     drags = 2.0 * tension * np.cbrt(liquid.viscosity / tension) ** 2 * edges
     discs = 2.0 * np.sqrt(radii * liquid.meniscus_radius)
-    lost = effect.merged * tension / liquid.meniscus_radius * _common(discs, 2.0 * sqrt(radii.prod()))
+    lost = (
+        effect.merged * tension / liquid.meniscus_radius * _common(discs, 2.0 * sqrt(radii.prod()))
+    )
     unit = dimer.capillary_scale
     return np.concatenate([lifts, couples, *drags]) / unit, np.array([0.5, 0.5, 0.0]) * lost / unit
 
@@ -146,9 +158,16 @@ def row(effect: Effect) -> dict[str, str]:
     walker = Walker.joined([Walker.of_case(case) for case in cases])
     more = np.array([effect.friction[0], *effect.friction])[:, None]
     resistances = walker.resistances.copy()
-    squeezed = np.array([3.0 * pi * case.liquid.of_bridges.viscosity * _curved(case) for case in cases]).T
+    squeezed = np.array(
+        [3.0 * pi * case.liquid.of_bridges.viscosity * _curved(case) for case in cases]
+    ).T
     resistances[0] += effect.asperities * squeezed
-    walker = replace(walker, friction=walker.friction * more, at_rest=walker.at_rest - lost.T, resistances=resistances)
+    walker = replace(
+        walker,
+        friction=walker.friction * more,
+        at_rest=walker.at_rest - lost.T,
+        resistances=resistances,
+    )
     motion = walk(
         walker,
         [case.excitation.frequency for case in cases],
@@ -157,9 +176,15 @@ def row(effect: Effect) -> dict[str, str]:
         effect=(_compiled(), terms),
     )
     velocity = dict(zip(_CASES, 1e3 * motion.velocity, strict=True))
-    mean = {peak: (velocity[f"{peak} g, 60 Hz"] + velocity[f"{peak} g, 90 Hz"]) / 2.0 for peak in _PEAKS}
+    mean = {
+        peak: (velocity[f"{peak} g, 60 Hz"] + velocity[f"{peak} g, 90 Hz"]) / 2.0 for peak in _PEAKS
+    }
     slide = effect.asperities * squeezed[0, 0] * _SHOWN / dimer_of(cases[0]).capillary_scale
-    lift, turn, drags = terms[0, 0] * _SHOWN, terms[0, 3], (terms[0, 5] + terms[0, 7]) * _SHOWN ** (2.0 / 3.0)
+    lift, turn, drags = (
+        terms[0, 0] * _SHOWN,
+        terms[0, 3],
+        (terms[0, 5] + terms[0, 7]) * _SHOWN ** (2.0 / 3.0),
+    )
     numbers = {
         "size, %": 100.0 * (lift + turn + drags + slide + lost[0, 0]) / walker.at_rest[0, 0],
         **{f"{peak} g": mean[peak] for peak in _PEAKS[:-1]},
@@ -170,7 +195,10 @@ def row(effect: Effect) -> dict[str, str]:
         "4b": velocity["Fig. 4b"],
         "4b, rotation": 1e3 * motion.rotation[0, -1],
     }
-    texts = {name: f"{number:.2f}" if np.isfinite(number) else "opens" for name, number in numbers.items()}
+    texts = {
+        name: f"{number:.2f}" if np.isfinite(number) else "opens"
+        for name, number in numbers.items()
+    }
     return {"mm/s": effect.name, **texts}
 
 

@@ -61,11 +61,17 @@ def main() -> None:
                 place.mkdir(parents=True)
                 write_deck(decks[way], place)
                 text = without_steps(decks[way].text)
-                took[way].append(cpu_time(place, ENGINE, text, steps, environment(stock=way == "minimal")) / steps)
+                took[way].append(
+                    cpu_time(place, ENGINE, text, steps, environment(stock=way == "minimal"))
+                    / steps
+                )
             of_today, of_minimal = median(took["today"]), median(took["minimal"])
             ratios[name] = {"minimal": round(of_minimal / of_today, 2)}
             speed = deck.layout.atoms / of_today / 1e6
-            print(f"| {name} | {1e6 * of_minimal:.1f} | {1e6 * of_today:.1f} | {speed:.1f} M |", flush=True)
+            print(
+                f"| {name} | {1e6 * of_minimal:.1f} | {1e6 * of_today:.1f} | {speed:.1f} M |",
+                flush=True,
+            )
     print(f"before: {RATIOS.read_text('utf-8')}")
     RATIOS.write_text(json.dumps(ratios, indent=2) + "\n", encoding="utf-8")
 
@@ -80,10 +86,14 @@ def shaken(case: str, folder: Path, **settings: object) -> list[Bead]:
     settings = {"run.ranks": 1, "run.duration": "0.1 s", "run.segment": "0.1 s"} | settings
     run = walkers.run(load_case(case, settings), folder / "starts")
     motion = run.motion
-    now = zip(*(one[-1].tolist() for one in (motion.position, motion.velocity, motion.spin)), strict=True)
+    now = zip(
+        *(one[-1].tolist() for one in (motion.position, motion.velocity, motion.spin)), strict=True
+    )
     return [
         Bead(number, tuple(place), radius, tuple(velocity), tuple(spin))
-        for number, ((place, velocity, spin), radius) in enumerate(zip(now, motion.radius.tolist(), strict=True), 1)
+        for number, ((place, velocity, spin), radius) in enumerate(
+            zip(now, motion.radius.tolist(), strict=True), 1
+        )
     ]
 
 
@@ -122,7 +132,9 @@ def minimal(deck: Deck, case: Case) -> str:
     walls += "fix gravity all gravity ${gravity} vector 0.0 0.0 -1.0\n"
     text = re.sub(r"(?m)^fix +walls all .*\n", "", text)
     ratio = case.contact.roughness.bead_wall / case.radii[0]
-    model = f"pair_style {_STOCK_MODEL}\n" + _STOCK_LIQUID.format(liquid=case.liquid.of_bridges, ratio=ratio)
+    model = f"pair_style {_STOCK_MODEL}\n" + _STOCK_LIQUID.format(
+        liquid=case.liquid.of_bridges, ratio=ratio
+    )
     text = re.sub(r"(?m)^pair_style .*\n", lambda _: model, text)
     return re.sub(r"(?m)^fix +motion ", lambda found: walls + found[0], text)
 
@@ -132,7 +144,9 @@ def without_steps(text: str) -> str:
     return re.sub(r"(?m)^run .*", "run STEPS", text)
 
 
-def cpu_time(folder: Path, command: Sequence[str], text: str, steps: int, environment: Mapping[str, str]) -> float:
+def cpu_time(
+    folder: Path, command: Sequence[str], text: str, steps: int, environment: Mapping[str, str]
+) -> float:
     """User CPU time of steps of a script, s: without that of its start. The script has STEPS for their number."""
     seconds = []
     for number in (0, steps):

@@ -125,23 +125,35 @@ class Script(NamedTuple):
 
 def main() -> None:
     """Print bead-steps per second and touching neighbours at the end, shaken and at rest."""
-    print("| code | beads | shaken: M bead-steps/s | neighbours | at rest: M bead-steps/s | neighbours |")
+    print(
+        "| code | beads | shaken: M bead-steps/s | neighbours | at rest: M bead-steps/s | neighbours |"
+    )
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         for case, steps in _PILES.items():
             beads, rows = shaken(case, Path(folder)), dict[str, list[list[float]]]()
-            still = [replace(bead, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) for bead in beads]
+            still = [
+                replace(bead, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) for bead in beads
+            ]
             for _ in range(REPEATS):
                 for column, (start, peak) in enumerate(((beads, None), (still, 0.0))):
-                    for code, script in scripts(case, start, steps, Path(folder) / f"{case}-{column}", peak).items():
+                    for code, script in scripts(
+                        case, start, steps, Path(folder) / f"{case}-{column}", peak
+                    ).items():
                         place = Path(folder) / f"{case}-{column}" / re.sub(r"\W+", "-", code)
                         _settle(script, place, _SETTLING_STEPS[case])
-                        seconds = cpu_time(place, script.command, script.text, steps, script.environment)
+                        seconds = cpu_time(
+                            place, script.command, script.text, steps, script.environment
+                        )
                         row = rows.setdefault(code, [[] for _ in range(4)])
                         row[2 * column].append(1e-6 * len(beads) * steps / seconds)
                         row[2 * column + 1].append(_neighbours(place, beads))
             for code, row in rows.items():
-                print(f"| {code} | {len(beads)} |", *(f"{median(values):.1f} |" for values in row), flush=True)
+                print(
+                    f"| {code} | {len(beads)} |",
+                    *(f"{median(values):.1f} |" for values in row),
+                    flush=True,
+                )
 
 
 def _settle(script: Script, place: Path, steps: int) -> None:
@@ -150,7 +162,9 @@ def _settle(script: Script, place: Path, steps: int) -> None:
         cpu_time(place, script.command, script.settling, steps, script.environment)
 
 
-def scripts(case: str, beads: list[Bead], steps: int, folder: Path, peak: float | None) -> dict[str, Script]:
+def scripts(
+    case: str, beads: list[Bead], steps: int, folder: Path, peak: float | None
+) -> dict[str, Script]:
     """Scripts of a pile for the codes that are installed; each code has its files in a folder by its name.
 
     ``peak`` is the acceleration of the drive, m/s²; None for that of the case.
@@ -160,26 +174,36 @@ def scripts(case: str, beads: list[Bead], steps: int, folder: Path, peak: float 
     values = _values(loaded, peak)
     changed = r"\g<1> {peak!r}".format(**values)
     ours, stock = (
-        re.sub(r"(peak_acceleration string) \S+", changed, one) for one in (deck.text, minimal(stock_deck, loaded))
+        re.sub(r"(peak_acceleration string) \S+", changed, one)
+        for one in (deck.text, minimal(stock_deck, loaded))
     )
     material = "{modulus} {e} {poisson}".format(**values)
     slip = "tangential mindlin NULL 1.0 {friction} damping tsuji".format(**values)
     found = {
-        "this project: Young–Laplace": Script(ENGINE, without_steps(ours), environment(stock=False)),
+        "this project: Young–Laplace": Script(
+            ENGINE, without_steps(ours), environment(stock=False)
+        ),
         "liggghts: easo": Script(ENGINE, without_steps(stock), environment(stock=True)),
     }
     if shutil.which(_LAMMPS[0]):
         laws = {
             "lammps: granular, DMT": (_GRANULAR, f"dmt {material} {values['tension']} {slip}"),
             "lammps: granular, dry": (_GRANULAR, f"hertz/material {material} {slip}"),
-            "lammps: hertz/history, dry": (_HISTORY, "{stiffness} NULL 3e9 NULL {friction} 1".format(**values)),
+            "lammps: hertz/history, dry": (
+                _HISTORY,
+                "{stiffness} NULL 3e9 NULL {friction} 1".format(**values),
+            ),
         }
         for name, (block, law) in laws.items():
             contacts = block.format(law=law, **values)
             fresh = _LAMMPS_PILE.format(start="read_data lammps.data", contacts=contacts, **values)
             if peak == 0.0 and name.endswith("dry"):
-                settled = _LAMMPS_PILE.format(start=f"read_restart {_SETTLED}", contacts=contacts, **values)
-                found[name] = Script(_LAMMPS, settled, environment(stock=True), fresh + _SETTLE_AND_KEEP)
+                settled = _LAMMPS_PILE.format(
+                    start=f"read_restart {_SETTLED}", contacts=contacts, **values
+                )
+                found[name] = Script(
+                    _LAMMPS, settled, environment(stock=True), fresh + _SETTLE_AND_KEEP
+                )
             else:
                 found[name] = Script(_LAMMPS, fresh, environment(stock=True))
     if shutil.which(_YADE[0]):
@@ -219,11 +243,21 @@ def _write_beads(place: Path, beads: list[Bead], case: Case) -> None:
     """The beads as files for LAMMPS and YADE."""
     rows = [(*bead.centre, bead.radius, *bead.velocity, *bead.spin) for bead in beads]
     np.savetxt(place / "beads.txt", rows, fmt="%.17g")
-    half, top = 0.5 * case.boundary.width + 2e-4, max(bead.centre[2] for bead in beads) + case.boundary.height
+    half, top = (
+        0.5 * case.boundary.width + 2e-4,
+        max(bead.centre[2] for bead in beads) + case.boundary.height,
+    )
     lines = ["beads", "", f"{len(beads)} atoms", "1 atom types", ""]
-    lines += [f"-{half} {half} {axis}lo {axis}hi" for axis in "xy"] + [f"-2e-4 {top} zlo zhi", "", "Atoms # sphere", ""]
+    lines += [f"-{half} {half} {axis}lo {axis}hi" for axis in "xy"] + [
+        f"-2e-4 {top} zlo zhi",
+        "",
+        "Atoms # sphere",
+        "",
+    ]
     for bead in beads:
-        lines.append(" ".join(map(repr, (bead.id, 1, 2.0 * bead.radius, case.beads.density, *bead.centre))))
+        lines.append(
+            " ".join(map(repr, (bead.id, 1, 2.0 * bead.radius, case.beads.density, *bead.centre)))
+        )
     lines += ["", "Velocities", ""]
     lines += [" ".join(map(repr, (bead.id, *bead.velocity, *bead.spin))) for bead in beads]
     (place / "lammps.data").write_text("\n".join(lines) + "\n", "utf-8")
@@ -238,7 +272,11 @@ def _neighbours(place: Path, beads: list[Bead]) -> float:
         centres = BinaryDump(place / "beads.bin", BEAD_COLUMNS).stack()[-1][:, 3:6]
     radii = np.array([bead.radius for bead in beads])
     one, other = cKDTree(centres).query_pairs(2.0 * radii.max(), output_type="ndarray").T
-    return 2.0 * np.sum(np.linalg.norm(centres[one] - centres[other], axis=1) < radii[one] + radii[other]) / len(beads)
+    return (
+        2.0
+        * np.sum(np.linalg.norm(centres[one] - centres[other], axis=1) < radii[one] + radii[other])
+        / len(beads)
+    )
 
 
 if __name__ == "__main__":

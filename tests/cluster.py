@@ -52,7 +52,11 @@ config = Config([pilots], strategy_period=0.5)
 
 def why_not() -> str | None:
     """Why there can be no cluster here, or None."""
-    missing = [name for name in ("munged", "slurmctld", "slurmd", "sbatch") if shutil.which(name, path=_PATH) is None]
+    missing = [
+        name
+        for name in ("munged", "slurmctld", "slurmd", "sbatch")
+        if shutil.which(name, path=_PATH) is None
+    ]
     if missing or os.getuid():
         return f"a throw-away SLURM cluster is for root; missing: {', '.join(missing) or 'nothing'}"
     return None
@@ -73,12 +77,16 @@ def slurm_cluster(folder: Path) -> Iterator[dict[str, str]]:
     for name in ("state", "spool", "munge"):
         (folder / name).mkdir()
     configuration = folder / "slurm.conf"
-    configuration.write_text(_CONFIGURATION.format(host=host, folder=folder, cores=cores, memory=memory, ports=ports))
+    configuration.write_text(
+        _CONFIGURATION.format(host=host, folder=folder, cores=cores, memory=memory, ports=ports)
+    )
     environment = {**os.environ, "PATH": _PATH, "SLURM_CONF": str(configuration)}
 
     def asked(program: str, what: str) -> bytes:
         """What a command of SLURM says; nothing if nobody answers."""
-        told = subprocess.run([program, "-h", "-o", what], env=environment, capture_output=True, check=False)
+        told = subprocess.run(
+            [program, "-h", "-o", what], env=environment, capture_output=True, check=False
+        )
         return told.stdout.strip()
 
     try:
@@ -88,7 +96,9 @@ def slurm_cluster(folder: Path) -> Iterator[dict[str, str]]:
         wait_for(lambda: asked("sinfo", "%T") == b"idle")
         yield environment
     finally:
-        subprocess.run(["scancel", "--user", "root"], env=environment, check=False, capture_output=True)
+        subprocess.run(
+            ["scancel", "--user", "root"], env=environment, check=False, capture_output=True
+        )
         wait_for(lambda: not asked("squeue", "%A"))
         for pid_file in (folder / "slurmd.pid", folder / "slurmctld.pid", folder / "munge" / "pid"):
             with suppress(OSError, ValueError):
@@ -100,7 +110,13 @@ def _start_munge(folder: Path) -> None:
     (folder / "key").chmod(0o600)
     for path in (folder, folder / "key"):
         shutil.chown(path, "munge", "munge")
-    places = {"socket": "socket", "key-file": "key", "pid-file": "pid", "log-file": "log", "seed-file": "seed"}
+    places = {
+        "socket": "socket",
+        "key-file": "key",
+        "pid-file": "pid",
+        "log-file": "log",
+        "seed-file": "seed",
+    }
     options = [f"--{name}={folder / place}" for name, place in places.items()]
     as_munge = ["setpriv", "--reuid", "munge", "--regid", "munge", "--clear-groups"]
     subprocess.run([*as_munge, str(shutil.which("munged", path=_PATH)), *options], check=True)

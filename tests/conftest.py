@@ -44,8 +44,18 @@ from walkers.sweeps.scheduler import Options, run_sweep
 # axis in equilibrium.
 REFERENCE: dict[str, Any] = {
     "beads": {"material": "ruby"},
-    "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
-    "liquid": {"name": "Si AK5", "volume_fraction": 0.01, "viscosity_ratio": 1.0, "contact_angle": "0 deg"},
+    "dimers": {
+        "radii": ["0.3 mm", "0.2 mm"],
+        "replicates": 1,
+        "angle_spread": "0 deg",
+        "gap_spread": 0.0,
+    },
+    "liquid": {
+        "name": "Si AK5",
+        "volume_fraction": 0.01,
+        "viscosity_ratio": 1.0,
+        "contact_angle": "0 deg",
+    },
     "boundary": {"material": "chromium-coated glass"},
     "contact": {
         "friction": {"bead_bead": 0.1, "bead_wall": 0.1},
@@ -199,8 +209,13 @@ def trajectory(run_directory: Callable[..., Path]) -> Callable[..., Group]:
     return lambda case=None, **changes: read_motion(run_directory(case, **changes)).groups[0]
 
 
-_FREQUENCIES, _PEAKS = {"drive.frequency": ["60 Hz", "80 Hz"]}, {"drive.peak_acceleration": ["2 g", "4 g", "6 g"]}
-_FRICTIONS = {f"contact.friction.bead_{other}": {"uniform": [0.05, 0.3]} for other in ("wall", "bead")}
+_FREQUENCIES, _PEAKS = (
+    {"drive.frequency": ["60 Hz", "80 Hz"]},
+    {"drive.peak_acceleration": ["2 g", "4 g", "6 g"]},
+)
+_FRICTIONS = {
+    f"contact.friction.bead_{other}": {"uniform": [0.05, 0.3]} for other in ("wall", "bead")
+}
 LOOKED_THROUGH: dict[str, dict[str, Any]] = {
     "grid": {"axes": {**_FREQUENCIES, **_PEAKS}},
     "rough": {
@@ -238,7 +253,12 @@ def brief_pile(**run: Any) -> Case:
     """A third of the shipped pile, settled and shaken for some hundredths of a second."""
     tables = read_toml(shipped("case")["pile-ci"])
     tables["mixture"] |= {"count": 20}
-    brief = {"duration": "0.03 s", "time_step": "3 us", "longest_settling": "0.02 s", "segment": "0.01 s"}
+    brief = {
+        "duration": "0.03 s",
+        "time_step": "3 us",
+        "longest_settling": "0.02 s",
+        "segment": "0.01 s",
+    }
     return build_case({**tables, "run": {**brief, **run}}, name="brief")
 
 
@@ -260,9 +280,17 @@ def pile_run(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
 
 
 @pytest.fixture(scope="session")
-def archive(run_directory: Callable[..., Path], once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+def archive(
+    run_directory: Callable[..., Path], once: Callable[[str, Callable[[Path], object]], Path]
+) -> Path:
     """The archive of a run, to be copied and damaged."""
-    return once("archived-run", lambda folder: write_archive(run_directory(run=SHORT), folder / "run.zip")) / "run.zip"
+    return (
+        once(
+            "archived-run",
+            lambda folder: write_archive(run_directory(run=SHORT), folder / "run.zip"),
+        )
+        / "run.zip"
+    )
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -294,7 +322,9 @@ def front(tmp_path: Path) -> Callable[[str], str]:
 def finished_places(out: Path) -> dict[str, Path]:
     """Directories of all finished runs of a folder, by name."""
     places = (path.parent for path in sorted(out.glob("*/manifest.json")))
-    return {place.name: place for place in places if place.suffix not in (".incomplete", ".replaced")}
+    return {
+        place.name: place for place in places if place.suffix not in (".incomplete", ".replaced")
+    }
 
 
 def bits(out: Path) -> dict[Path, bytes]:
@@ -306,7 +336,9 @@ def bits(out: Path) -> dict[Path, bytes]:
 
 def engines_in(directory: Path) -> list[int]:
     """Process ids of the engines that work in a directory or below."""
-    return processes_in(directory, b"liggghts", b"\0-in\0")  # not ldd, which asks what the engine is linked to
+    return processes_in(
+        directory, b"liggghts", b"\0-in\0"
+    )  # not ldd, which asks what the engine is linked to
 
 
 def processes_in(directory: Path, *words: bytes) -> list[int]:
@@ -345,17 +377,26 @@ def call(
     Its warnings are those of a process of its own, and the handlers that it sets are taken back. Where signals, pipes
     or the interpreter's end matter, tests start `PROGRAM`.
     """
-    out, errors = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
+    out, errors = (
+        io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2)
+    )
     argv = sys.argv
     handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
-    with redirect_stdout(out), redirect_stderr(errors), chdir(folder or "."), warnings.catch_warnings():
+    with (
+        redirect_stdout(out),
+        redirect_stderr(errors),
+        chdir(folder or "."),
+        warnings.catch_warnings(),
+    ):
         warnings.resetwarnings()
         for kind in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
             warnings.simplefilter("ignore", kind)
         try:
             if study:
                 sys.argv = [study, *arguments]
-                warnings.filterwarnings("ignore", ".*unpredictable", RuntimeWarning)  # a test may have imported it
+                warnings.filterwarnings(
+                    "ignore", ".*unpredictable", RuntimeWarning
+                )  # a test may have imported it
                 runpy.run_module(study, run_name="__main__")
             else:
                 main([*arguments])

@@ -47,7 +47,9 @@ def _marked(axes: Axes) -> list[Bbox]:
     for axis in (axes.xaxis, axes.yaxis) if axes.axison else ():
         low, high = sorted(axis.get_view_interval())
         ticks = (tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high)
-        found += [mark.get_window_extent() for tick in ticks for mark in (tick.tick1line, tick.tick2line)]
+        found += [
+            mark.get_window_extent() for tick in ticks for mark in (tick.tick1line, tick.tick2line)
+        ]
     return found
 
 
@@ -56,8 +58,15 @@ def _over_data(box: Bbox, axes: Axes) -> bool:
     seen = Bbox.intersection(box, axes.bbox)
     if seen is None or min(seen.size) < 1.0:
         return False
-    lines = [line for line in axes.lines if line.get_transform() == axes.transData and len(line.get_xydata())]
-    paths = [(axes.transData.transform_path(line.get_path()).cleaned(remove_nans=True), line) for line in lines]
+    lines = [
+        line
+        for line in axes.lines
+        if line.get_transform() == axes.transData and len(line.get_xydata())
+    ]
+    paths = [
+        (axes.transData.transform_path(line.get_path()).cleaned(remove_nans=True), line)
+        for line in lines
+    ]
     return any(
         seen.count_contains(path.vertices)
         if line.get_linestyle() in ("None", "", " ")
@@ -75,22 +84,39 @@ def spoilt(figure: Figure) -> list[str]:
     upright = [text for text in texts if not text.get_rotation() % 90.0]
     legends = [one for one in figure.findobj(Legend) if one.get_visible()]
     written = {id(text) for legend in legends for text in legend.findobj(Text)}
-    boxes = [(text.get_text(), text.get_window_extent().padded(-shrunk), id(text) in written) for text in upright]
+    boxes = [
+        (text.get_text(), text.get_window_extent().padded(-shrunk), id(text) in written)
+        for text in upright
+    ]
     frames = [("legend", legend.get_window_extent().padded(-shrunk), False) for legend in legends]
     free = [*(one for one in boxes if not one[2]), *frames]
     pairs = [*combinations(boxes, 2), *combinations(free, 2)]
-    found = [f"{one!r} over {other!r}" for (one, box, _), (other, place, _) in pairs if box.overlaps(place)]
+    found = [
+        f"{one!r} over {other!r}"
+        for (one, box, _), (other, place, _) in pairs
+        if box.overlaps(place)
+    ]
     for axes in (one for one in figure.axes if one.get_visible()):
         marks = _marked(axes)
         for name, box, _ in free:
             found += [f"{name!r} over data"] if _over_data(box, axes) else []
             found += [f"{name!r} over a tick"] if any(box.overlaps(mark) for mark in marks) else []
     for name, box, _ in (*boxes, *frames):
-        found += [f"{name!r} is cut off"] if (box.p0 < figure.bbox.p0).any() or (box.p1 > figure.bbox.p1).any() else []
+        found += (
+            [f"{name!r} is cut off"]
+            if (box.p0 < figure.bbox.p0).any() or (box.p1 > figure.bbox.p1).any()
+            else []
+        )
     sizes = {text.get_text(): float(text.get_fontsize()) for text in texts}
-    found += [f"{told!r} has {size:g} pt" for told, size in sizes.items() if size < LEAST_SIZE - 1e-9]
+    found += [
+        f"{told!r} has {size:g} pt" for told, size in sizes.items() if size < LEAST_SIZE - 1e-9
+    ]
     width = float(figure.get_size_inches()[0])
-    return found if any(abs(width - column) < 1e-9 for column in COLUMNS) else [*found, f"{width:g} inches wide"]
+    return (
+        found
+        if any(abs(width - column) < 1e-9 for column in COLUMNS)
+        else [*found, f"{width:g} inches wide"]
+    )
 
 
 def letters(figure: Figure) -> list[str]:

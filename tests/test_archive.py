@@ -45,7 +45,9 @@ def shared(once: Callable[[str, Callable[[Path], object]], Path], tmp_path: Path
 
     def fill(folder: Path) -> None:
         (folder / "base.toml").write_text(to_toml(document(run=SHORT)))
-        (folder / "angles.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+        (folder / "angles.toml").write_text(
+            'case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n'
+        )
         call("sweep", "angles.toml", "-j", "1", check=True, folder=folder)
 
     return Path(shutil.copytree(once("archived-sweep", fill) / "runs", tmp_path / "shared"))
@@ -62,7 +64,9 @@ def test_manifests_say_what_made_the_run(run: Path) -> None:
     manifest = read_manifest(run)
     files = {path.relative_to(run).as_posix(): path for path in run.rglob("*") if path.is_file()}
     del files["manifest.json"]
-    assert manifest["sha256"] == {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
+    assert manifest["sha256"] == {
+        name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()
+    }
     assert manifest["files"] == {name: path.stat().st_size for name, path in files.items()}
     assert manifest["packages"]["numpy"] == np.__version__
     assert manifest["commit"] == software()["commit"]
@@ -111,7 +115,9 @@ def test_an_archive_of_a_run(run: Path, tmp_path: Path) -> None:
     assert _verified(unpacked, 1)[1] == f"  missing    runs/{run.name}/result.json"
     manifest = read_manifest(run)
     listed = dict(line.split("  ")[::-1] for line in (unpacked / SUMS).read_text().splitlines())
-    assert {name: listed[f"runs/{run.name}/{name}"] for name in manifest["sha256"]} == manifest["sha256"]
+    assert {name: listed[f"runs/{run.name}/{name}"] for name in manifest["sha256"]} == manifest[
+        "sha256"
+    ]
     record = read_json(unpacked / RECORD)
     assert (record["authors"], record["licence"]) == (["Josiah Carberry"], "CC-BY-4.0")
     assert (record["name"], record["finished"]) == (run.name, manifest["finished"])
@@ -130,16 +136,27 @@ def test_an_archive_has_the_date_of_its_last_run() -> None:
     assert Contents("three", "", manifests, cases={}, files={}, main=[]).finished == dates[1]
 
 
-def test_the_record_of_an_archive_names_the_programs_that_made_and_measured_a_run(run: Path, tmp_path: Path) -> None:
+def test_the_record_of_an_archive_names_the_programs_that_made_and_measured_a_run(
+    run: Path, tmp_path: Path
+) -> None:
     """The run was measured again by a later version. Nothing is said that the user does not say."""
-    later = {**software(), "granular_walkers": "99.0", "commit": None, "date": "2099-01-01T00:00:00Z", "files": []}
+    later = {
+        **software(),
+        "granular_walkers": "99.0",
+        "commit": None,
+        "date": "2099-01-01T00:00:00Z",
+        "files": [],
+    }
     write_json(run / "manifest.json", {**read_manifest(run), "tabulated": later})
     with zipfile.ZipFile(write_archive(run, tmp_path / "run.zip")) as packed:
         record = json.loads(packed.read(RECORD))
         readme = packed.read("README.md").decode()
     about = record["runs"][f"runs/{run.name}"]
     assert about["made_by"]["granular_walkers"] == software()["granular_walkers"]
-    assert (about["measured_by"]["granular_walkers"], about["measured_by"]["date"]) == ("99.0", later["date"])
+    assert (about["measured_by"]["granular_walkers"], about["measured_by"]["date"]) == (
+        "99.0",
+        later["date"],
+    )
     assert (record["authors"], record["licence"]) == ([], None)
     assert "Licence:" not in readme
     assert "\nBy " not in readme
@@ -150,9 +167,16 @@ def test_an_archive_without_dumps(run: Path, tmp_path: Path) -> None:
     call("export", str(run), "--to", "archive", "-o", str(archive), "--without-dumps", check=True)
     shutil.unpack_archive(archive, tmp_path / "unpacked")
     there = tmp_path / "unpacked" / "runs" / run.name
-    dumps = [f"  left out   segments/0000/{name}" for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt")]
+    dumps = [
+        f"  left out   segments/0000/{name}"
+        for name in ("beads.bin", "bridges.pairs.txt", "bridges.walls.txt")
+    ]
     files = len(read_manifest(run)["files"])
-    assert _verified(there) == [f"{run.name}: {files - 3} files are unchanged", "  made since test.toml", *dumps]
+    assert _verified(there) == [
+        f"{run.name}: {files - 3} files are unchanged",
+        "  made since test.toml",
+        *dumps,
+    ]
     assert Run(there).result == Run(run).result
     call("export", str(there), "--to", "archive", "-o", str(again), "--without-dumps", check=True)
     assert archive.read_bytes() == again.read_bytes()
@@ -163,16 +187,22 @@ def test_an_archive_without_dumps(run: Path, tmp_path: Path) -> None:
 def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     """Runs that shared a deck come with it, and the table is what it was."""
     archive, unpacked = tmp_path / "sweep.zip", tmp_path / "unpacked"
-    call("export", str(shared / "angles"), "--to", "archive", "-o", str(archive), *AUTHOR, check=True)
+    call(
+        "export", str(shared / "angles"), "--to", "archive", "-o", str(archive), *AUTHOR, check=True
+    )
     shutil.unpack_archive(archive, unpacked)
     there = unpacked / "runs" / "angles"
     before, after = (load(folder).drop(columns="run") for folder in (shared / "angles", there))
     assert list(after["status"]) == ["finished"] * 2
     assert before.equals(after)
     places = [unpacked / place for place in pd.read_csv(there / "table.csv")["run"]]
-    assert [place.name for place in places] == [Path(place).name for place in load(shared / "angles")["run"]]
+    assert [place.name for place in places] == [
+        Path(place).name for place in load(shared / "angles")["run"]
+    ]
     for place, angle in zip(places, ("0 deg", "10 deg"), strict=True):
-        assert load_case(place / "base.toml") == build_case(document(run=SHORT, dimers={"angle": angle}), name="base")
+        assert load_case(place / "base.toml") == build_case(
+            document(run=SHORT, dimers={"angle": angle}), name="base"
+        )
     assert list(read_json(unpacked / RECORD)["runs"]) == [f"runs/{place.name}" for place in places]
     assert _verified(there)[0] == "angles: 2 points have a run"
     deck = places[0] / "shared_deck" / "walker.lig"
@@ -181,7 +211,10 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     for place in places:
         shutil.rmtree(place)
     gone = _verified(there, 1)
-    assert (gone[0], sum("(missing: point " in line for line in gone)) == ("angles: 0 points have a run", 2)
+    assert (gone[0], sum("(missing: point " in line for line in gone)) == (
+        "angles: 0 points have a run",
+        2,
+    )
     refused = call("export", str(there), "--to", "archive", "-o", str(tmp_path / "two.zip"))
     assert (refused.returncode, "2 of 2 points are not finished" in refused.stderr) == (2, True)
 
@@ -196,7 +229,9 @@ def test_a_run_without_dumps_keeps_its_results_and_is_whole(run: Path) -> None:
     assert Run(run).result["velocity"] == Run(run).result.table("walkers")["velocity"].mean()
 
 
-def test_an_archive_that_cannot_be_made_leaves_the_older_one(run: Path, archive: Path, tmp_path: Path) -> None:
+def test_an_archive_that_cannot_be_made_leaves_the_older_one(
+    run: Path, archive: Path, tmp_path: Path
+) -> None:
     older = Path(shutil.copy(archive, tmp_path / "run.zip"))
     with next(run.rglob("engine.log")).open("a") as log:
         log.write("more\n")
@@ -258,7 +293,10 @@ def test_an_archive_that_is_not_unpacked_is_checked_as_it_is(archive: Path, tmp_
     with zipfile.ZipFile(archive) as packed:
         files = packed.namelist()
     table = next(name for name in files if name.endswith("walkers.parquet"))
-    whole, one_less = f"{len(files) - 1} files are unchanged", f"{len(files) - 2} files are unchanged"
+    whole, one_less = (
+        f"{len(files) - 1} files are unchanged",
+        f"{len(files) - 2} files are unchanged",
+    )
     assert _verified(archive) == [f"run.zip: {whole}"]
     to = tmp_path / "copy.zip"
     _rewritten(archive, to, {table: b"other"})
@@ -370,7 +408,9 @@ def _short_run(folder: Path) -> Path:
 def _sweep(folder: Path) -> Path:
     """A sweep whose points share a deck."""
     (folder / "base.toml").write_text(to_toml(document(run=SHORT)))
-    (folder / "angles.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+    (folder / "angles.toml").write_text(
+        'case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n'
+    )
     return walkers.sweep(folder / "angles.toml", folder / "runs").directory
 
 
@@ -382,7 +422,9 @@ def _sweep(folder: Path) -> Path:
         pytest.param(_sweep, marks=pytest.mark.slow),
     ],
 )
-def test_the_commands_of_a_readme_repeat_the_run(make: Callable[[Path], Path], tmp_path: Path) -> None:
+def test_the_commands_of_a_readme_repeat_the_run(
+    make: Callable[[Path], Path], tmp_path: Path
+) -> None:
     """As they are printed: with LIGGGHTS alone by the script and by hand, and with the program."""
     (tmp_path / "made").mkdir()
     directory = make(tmp_path / "made")
@@ -405,10 +447,14 @@ def test_the_commands_of_a_readme_repeat_the_run(make: Callable[[Path], Path], t
     assert "archive.json: OK" in told
     assert f"\n{unpacked.name}: " in told
     (repeated,) = (tmp_path / "repeated").glob("*/manifest.json")
-    assert Run(repeated.parent).result["velocity"] == pytest.approx(Run(run).result["velocity"], rel=1e-9)
+    assert Run(repeated.parent).result["velocity"] == pytest.approx(
+        Run(run).result["velocity"], rel=1e-9
+    )
 
 
-@pytest.mark.parametrize("make", [_long_run, pytest.param(_parallel_run, marks=pytest.mark.slow), _edited_deck])
+@pytest.mark.parametrize(
+    "make", [_long_run, pytest.param(_parallel_run, marks=pytest.mark.slow), _edited_deck]
+)
 def test_liggghts_alone_repeats_the_run_of_an_archive(
     make: Callable[[Path], Path], repeat: Repeat, tmp_path: Path
 ) -> None:
@@ -422,7 +468,10 @@ def test_liggghts_alone_repeats_the_run_of_an_archive(
     assert done.returncode == 0, done.stderr
     dumps = len([*unpacked.glob("runs/**/beads.bin"), *unpacked.glob("runs/**/bridges.*s.txt")])
     assert done.stdout.count("the same   ") == len(done.stdout.splitlines()) == dumps >= 3
-    assert f"sh repeat.sh runs/{directory.name} ../repeated-by-liggghts" in (unpacked / "README.md").read_text()
+    assert (
+        f"sh repeat.sh runs/{directory.name} ../repeated-by-liggghts"
+        in (unpacked / "README.md").read_text()
+    )
     # A dump that is not the engine's is found.
     beads = sorted(unpacked.glob("runs/**/beads.bin"))[-1]
     beads.write_bytes(beads.read_bytes()[:-1] + b"x")
@@ -431,9 +480,19 @@ def test_liggghts_alone_repeats_the_run_of_an_archive(
     assert (again.returncode, again.stdout.count("different  ")) == (1, 1)
 
 
-def test_an_archive_says_what_it_cannot_repeat(shared: Path, repeat: Repeat, tmp_path: Path) -> None:
+def test_an_archive_says_what_it_cannot_repeat(
+    shared: Path, repeat: Repeat, tmp_path: Path
+) -> None:
     """A shared deck is run for all of its runs; without tables of forces there is nothing to run."""
-    call("export", str(shared / "angles"), "--to", "archive", "-o", str(tmp_path / "two.zip"), check=True)
+    call(
+        "export",
+        str(shared / "angles"),
+        "--to",
+        "archive",
+        "-o",
+        str(tmp_path / "two.zip"),
+        check=True,
+    )
     unpacked = tmp_path / "unpacked"
     shutil.unpack_archive(tmp_path / "two.zip", unpacked)
     run = Path(pd.read_csv(unpacked / "runs" / "angles" / "table.csv")["run"][0]).name
@@ -444,21 +503,35 @@ def test_an_archive_says_what_it_cannot_repeat(shared: Path, repeat: Repeat, tmp
     shutil.rmtree(unpacked / "repeated")
     (unpacked / "runs" / run / "shared_deck" / "bridges.txt").unlink()
     refused = repeat(unpacked, run)
-    assert (refused.returncode, "tables of forces (bridges.txt) were left out" in refused.stderr) == (2, True)
+    assert (
+        refused.returncode,
+        "tables of forces (bridges.txt) were left out" in refused.stderr,
+    ) == (2, True)
 
 
-def test_the_readme_says_who_made_the_archive_and_with_which_contact_model(run: Path, tmp_path: Path) -> None:
+def test_the_readme_says_who_made_the_archive_and_with_which_contact_model(
+    run: Path, tmp_path: Path
+) -> None:
     assert read_manifest(run)["contact_model"].items() >= model_version().items()
     texts = []
-    models = [{"path": "", **model_version()}, {"forces_version": model_version()["forces_version"]}, {}, None]
+    models = [
+        {"path": "", **model_version()},
+        {"forces_version": model_version()["forces_version"]},
+        {},
+        None,
+    ]
     for model in models:
         manifest = read_manifest(run)
         manifest["contact_model"] = model
         write_json(run / "manifest.json", manifest)
-        archive = write_archive(run, tmp_path / "run.zip", authors=["A. User", "*B*"], licence="CC0-1.0")
+        archive = write_archive(
+            run, tmp_path / "run.zip", authors=["A. User", "*B*"], licence="CC0-1.0"
+        )
         with zipfile.ZipFile(archive) as packed:
             texts.append(packed.read("README.md").decode())
-    assert "computed from it.\n\nBy A. User, \\*B\\*. Licence: CC0-1.0. The contact model" in texts[0]
+    assert (
+        "computed from it.\n\nBy A. User, \\*B\\*. Licence: CC0-1.0. The contact model" in texts[0]
+    )
     same, other, unknown, by_hand = texts
     assert "The runs were made with these sources." in same
     assert "other sources that compute the same forces" in other
@@ -473,7 +546,9 @@ def uncertain(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     def fill(folder: Path) -> None:
         ranges = {"uncertain": {"contact.restitution": [0.2, 0.5]}}
         (folder / "base.toml").write_text(to_toml(document(run=SHORT, **ranges)))
-        (folder / "angles.toml").write_text('case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+        (folder / "angles.toml").write_text(
+            'case = "base.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n'
+        )
         command = ["sweep", "angles.toml", "-j", "1", "--spread", "--points", "2"]
         call(*command, check=True, folder=folder)
         call("run", "base.toml", "--accuracy", check=True, folder=folder)
@@ -481,7 +556,9 @@ def uncertain(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     return once("uncertain", fill)
 
 
-def test_the_archive_of_a_draw_says_that_liggghts_cannot_repeat_it(uncertain: Path, tmp_path: Path) -> None:
+def test_the_archive_of_a_draw_says_that_liggghts_cannot_repeat_it(
+    uncertain: Path, tmp_path: Path
+) -> None:
     """It has no tables of forces; the program repeats it."""
     runs = [Path(run).name for run in load(uncertain / "runs" / "angles")["run"]]
     draw = uncertain / "runs" / Path(load(uncertain / "runs" / f"{runs[1]}-spread")["run"][0]).name
@@ -498,7 +575,9 @@ def test_the_archive_of_a_draw_says_that_liggghts_cannot_repeat_it(uncertain: Pa
 
 
 @pytest.mark.parametrize("what", ["a run", "a sweep"])
-def test_archives_have_the_spread_and_the_accuracy(what: str, uncertain: Path, tmp_path: Path) -> None:
+def test_archives_have_the_spread_and_the_accuracy(
+    what: str, uncertain: Path, tmp_path: Path
+) -> None:
     """A colleague sees the same band, error and figures, and the check finds nothing missing."""
     table = load(uncertain / "runs" / "angles")
     runs = [Path(run).name for run in table["run"]]
@@ -513,9 +592,14 @@ def test_archives_have_the_spread_and_the_accuracy(what: str, uncertain: Path, t
         before, after = (Run(folder / run).result for folder in (uncertain / "runs", there))
         assert {"velocity_low", "velocity_high", "velocity_draws"} <= after.keys()
         assert after == before
-        assert list(load(there / f"{run}-spread")["status"]) == ["finished"] * len(load(there / f"{run}-spread"))
+        assert list(load(there / f"{run}-spread")["status"]) == ["finished"] * len(
+            load(there / f"{run}-spread")
+        )
         call("plot", str(there / f"{run}-spread"), "--to", str(tmp_path / "draws.png"), check=True)
-    assert Run(there / runs[0]).result["velocity_error"] == Run(uncertain / "runs" / runs[0]).result["velocity_error"]
+    assert (
+        Run(there / runs[0]).result["velocity_error"]
+        == Run(uncertain / "runs" / runs[0]).result["velocity_error"]
+    )
     assert (there / f"{runs[0]}-accuracy" / "sweep.json").is_file()
     told = call("run", str(there / runs[0]), check=True).stdout
     assert re.search(r"velocity along the heading .* band [0-9.]+ to [0-9.]+", told)

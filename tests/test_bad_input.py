@@ -31,7 +31,9 @@ def bead(radius: str, x: str, z: str = "1 mm") -> dict[str, Any]:
 
 
 def material(name: str, **density: Any) -> str:
-    return to_toml({"materials": {name: {"density": {"value": "2 g/cm^3", "source": "x", **density}}}})
+    return to_toml(
+        {"materials": {name: {"density": {"value": "2 g/cm^3", "source": "x", **density}}}}
+    )
 
 
 def pairs(*materials: list[str]) -> str:
@@ -146,14 +148,29 @@ CASES: list[tuple[dict[str, Any], str]] = [
      'library.surface_pairs[0].materials = "rubby": not in the library; expected one of ruby, '),
 ]  # fmt: skip
 LIBRARIES: list[tuple[str, str]] = [
-    ('[materials.mine]\ndensity = "2 g/cm^3"', 'density = "2 g/cm^3": expected { value = ..., source = "..." }'),
-    ('[materials.mine]\ndensity = { value = "2 g/cm^3" }', 'source: missing; expected a value such as "weighed"'),
+    (
+        '[materials.mine]\ndensity = "2 g/cm^3"',
+        'density = "2 g/cm^3": expected { value = ..., source = "..." }',
+    ),
+    (
+        '[materials.mine]\ndensity = { value = "2 g/cm^3" }',
+        'source: missing; expected a value such as "weighed"',
+    ),
     ("[material.mine]", 'library.toml: material = {"mine": {}}: unknown key; a library takes '),
     (material("glass"), "materials.glass: is in the library of"),
-    (material("m", range=["3 g/cm^3", "4 g/cm^3"]), "expected two ends with the value between them"),
+    (
+        material("m", range=["3 g/cm^3", "4 g/cm^3"]),
+        "expected two ends with the value between them",
+    ),
     (material("a\x1b[31m"), "materials.a\\x1b[31m: expected printable text on one line"),
-    (pairs(["glass", "ruby"], ["ruby", "glass"]), "surface_pairs[1] = ruby on glass: is given twice; expected one"),
-    (pairs(["chromium-coated glass", "ruby"]), "[0] = chromium-coated glass on ruby: is in the library of"),
+    (
+        pairs(["glass", "ruby"], ["ruby", "glass"]),
+        "surface_pairs[1] = ruby on glass: is given twice; expected one",
+    ),
+    (
+        pairs(["chromium-coated glass", "ruby"]),
+        "[0] = chromium-coated glass on ruby: is in the library of",
+    ),
 ]
 SQUARE = [(x, y, z) for z in (0, 4) for x, y in ((-2, -2), (2, -2), (2, 2), (-2, 2))]
 FLIPPED = [(x, -y, -z) for x, y, z in SQUARE]
@@ -176,7 +193,9 @@ TETRAHEDRON = [(1, 3, 2), (1, 2, 4), (2, 3, 4), (3, 1, 4)]
 
 def beside(points: list[tuple[float, ...]]) -> str:
     """A box, and a tetrahedron of given points with it."""
-    return obj([*SQUARE, *points], [*OPEN_BOX, *(tuple(8 + k for k in face) for face in TETRAHEDRON)])
+    return obj(
+        [*SQUARE, *points], [*OPEN_BOX, *(tuple(8 + k for k in face) for face in TETRAHEDRON)]
+    )
 
 
 def plane(*normal: float, at: tuple[str, str, str] = ("0 mm", "0 mm", "0 mm")) -> dict[str, Any]:
@@ -232,10 +251,19 @@ USE_LAW = "show fig1b --set liquid.law=own.py:law"
 LAWS: list[tuple[str, str]] = [
     ("def law(surfaces): raise KeyError('x')", "raises KeyError: 'x'"),
     ("law = 3", "has no function law"),
-    ("def law(surfaces): return Curve(forces, -1.0)", "breaks at a gap of -1 m; expected a positive number"),
-    ("def law(surfaces): return Curve(forces, 1e-4, 2e-4)", "forms at a gap of 0.0002 m; expected 0 to its rupture"),
+    (
+        "def law(surfaces): return Curve(forces, -1.0)",
+        "breaks at a gap of -1 m; expected a positive number",
+    ),
+    (
+        "def law(surfaces): return Curve(forces, 1e-4, 2e-4)",
+        "forms at a gap of 0.0002 m; expected 0 to its rupture",
+    ),
     ("def law(surfaces): return Curve(lambda gaps: gaps, 1e-4)", "forces are ndarray; expected"),
-    ("def law(surfaces): return Curve(lambda gaps: forces(gaps, np.nan), 1e-4)", "the pull is not a number"),
+    (
+        "def law(surfaces): return Curve(lambda gaps: forces(gaps, np.nan), 1e-4)",
+        "the pull is not a number",
+    ),
 ]
 LONG = "x" * 100_000
 
@@ -243,59 +271,169 @@ LONG = "x" * 100_000
 def trace(head: str = "time (ms), x (g)", rows: int = 100, step: float = 0.5, **odd: str) -> str:
     """A record of 4 g at 80 Hz, with some odd rows by number."""
     lines = [f"{step * row!r}, {4.0 * sin(160e-3 * pi * step * row)!r}" for row in range(rows)]
-    return "\n".join([head, *(odd.get(f"row_{number}", line) for number, line in enumerate(lines, 1))])
+    return "\n".join(
+        [head, *(odd.get(f"row_{number}", line) for number, line in enumerate(lines, 1))]
+    )
 
 
-STAMPS = "\n".join(["time (ms), x (g)", *(f"{row // 5}, {4.0 * sin(0.1 * row)!r}" for row in range(1000))])
-GAP = "\n".join(line for number, line in enumerate(trace(rows=200).split("\n")) if number not in (51, 52, 53))
-HOLES = "\n".join(line for number, line in enumerate(trace(rows=200).split("\n")) if number not in (6, 60, 90))
+STAMPS = "\n".join(
+    ["time (ms), x (g)", *(f"{row // 5}, {4.0 * sin(0.1 * row)!r}" for row in range(1000))]
+)
+GAP = "\n".join(
+    line for number, line in enumerate(trace(rows=200).split("\n")) if number not in (51, 52, 53)
+)
+HOLES = "\n".join(
+    line for number, line in enumerate(trace(rows=200).split("\n")) if number not in (6, 60, 90)
+)
 DEAD = "\n".join(["time (ms), x (g)", *(f"{0.2 * row!r}, 1.0" for row in range(1000))])
-FAINT = "\n".join(["time (ms), x (g)", *(f"{0.5 * row!r}, {4e-310 * sin(0.25 * row)!r}" for row in range(1000))])
+FAINT = "\n".join(
+    ["time (ms), x (g)", *(f"{0.5 * row!r}, {4e-310 * sin(0.25 * row)!r}" for row in range(1000))]
+)
 # A record, what else the drive and the run say, and the message after the key.
 RECORDS: list[tuple[str | bytes, dict[str, Any], str]] = [
-    (trace("time, x (g)"), {}, 'drive.record = "record.csv": column "time": expected a time with its unit'),
-    (trace("time (ms), ax"), {}, 'column "ax": expected an acceleration with its unit, such as "4 g", in brackets'),
-    (trace("time (ms), x (mm)"), {}, 'record = "record.csv": column "x (mm)": expected an acceleration with its unit'),
-    (trace("time (ms), acceleration (g)"), {}, '"time (ms), acceleration (g)" names no acceleration along x, y or z'),
+    (
+        trace("time, x (g)"),
+        {},
+        'drive.record = "record.csv": column "time": expected a time with its unit',
+    ),
+    (
+        trace("time (ms), ax"),
+        {},
+        'column "ax": expected an acceleration with its unit, such as "4 g", in brackets',
+    ),
+    (
+        trace("time (ms), x (mm)"),
+        {},
+        'record = "record.csv": column "x (mm)": expected an acceleration with its unit',
+    ),
+    (
+        trace("time (ms), acceleration (g)"),
+        {},
+        '"time (ms), acceleration (g)" names no acceleration along x, y or z',
+    ),
     (trace("count, x (g)"), {}, '"count, x (g)" names no time'),
-    (trace("LabVIEW Measurement"), {}, 'found "LabVIEW Measurement": replace all lines above the numbers by a header'),
-    (trace("time (ms), x (g), acc_x (g)"), {}, 'columns "x (g)" and "acc_x (g)" are both the acceleration along x'),
-    (trace("time (ms), t (ms), x (g)"), {}, 'columns "time (ms)" and "t (ms)" are both the time; expected one'),
+    (
+        trace("LabVIEW Measurement"),
+        {},
+        'found "LabVIEW Measurement": replace all lines above the numbers by a header',
+    ),
+    (
+        trace("time (ms), x (g), acc_x (g)"),
+        {},
+        'columns "x (g)" and "acc_x (g)" are both the acceleration along x',
+    ),
+    (
+        trace("time (ms), t (ms), x (g)"),
+        {},
+        'columns "time (ms)" and "t (ms)" are both the time; expected one',
+    ),
     ("", {}, "is empty; expected a header that names the time and accelerations along x, y or z"),
     (b"\xff\xfe", {}, "expected UTF-8 text, found byte 0xff in line 1: save the file as UTF-8"),
-    ("time (s), x (m/s²)\n0, 1\n".encode("latin-1"), {}, "found byte 0xb2 in line 1: save the file as UTF-8"),
+    (
+        "time (s), x (m/s²)\n0, 1\n".encode("latin-1"),
+        {},
+        "found byte 0xb2 in line 1: save the file as UTF-8",
+    ),
     (trace().encode("utf-16-le"), {}, "found zero bytes: save the file as UTF-8"),
-    (trace(row_7="3.0, 1.0, 2.0"), {}, "row 7 has 3 values, the header 2 names: decimal commas? Then separate the"),
-    (trace(row_1="0,0,0,02"), {}, "row 1 has 4 values, the header 2 names: decimal commas? Then separate the columns"),
-    (trace("time (ms); x (g)", row_7="3; 1; 2").replace(", ", "; "), {}, "row 7 has 3 values, the header 2 names; exp"),
-    (trace("time (ms); x (g)", row_7="3; 1,5").replace(", ", "; "), {}, 'a comma, "1,5", and with a point, "0.0"; exp'),
+    (
+        trace(row_7="3.0, 1.0, 2.0"),
+        {},
+        "row 7 has 3 values, the header 2 names: decimal commas? Then separate the",
+    ),
+    (
+        trace(row_1="0,0,0,02"),
+        {},
+        "row 1 has 4 values, the header 2 names: decimal commas? Then separate the columns",
+    ),
+    (
+        trace("time (ms); x (g)", row_7="3; 1; 2").replace(", ", "; "),
+        {},
+        "row 7 has 3 values, the header 2 names; exp",
+    ),
+    (
+        trace("time (ms); x (g)", row_7="3; 1,5").replace(", ", "; "),
+        {},
+        'a comma, "1,5", and with a point, "0.0"; exp',
+    ),
     (trace(row_7="3.0"), {}, 'row 7: column "x (g)" is ""; expected a number'),
     (trace(row_7="3.0, nan"), {}, 'row 7: column "x (g)" is "nan"; expected a number'),
     (trace(row_7="3.0, 1_0"), {}, 'row 7: column "x (g)" is "1_0"; expected a number'),
-    (trace(row_7="3.0, 1e5"), {}, "row 7: expected a number in each column, accelerations up to 10000 m/s²"),
-    (trace(row_7="2.5, 1.0"), {}, "row 7 is 0 ms after the one before; expected times that increase without gaps"),
-    (GAP, {}, "row 51 is 2 ms after the one before; expected times that increase without gaps, about 0.5 ms apart"),
-    (HOLES, {}, "row 6 is 1 ms after the one before; expected times that increase without gaps, about 0.5 ms apart"),
-    (trace(row_7="-3.0, 1.0"), {}, "row 7 is -5.5 ms after the one before; expected times that increase without gaps"),
-    (trace(step=-0.5), {}, "times decrease from row to row; expected the first measurement in the first row"),
+    (
+        trace(row_7="3.0, 1e5"),
+        {},
+        "row 7: expected a number in each column, accelerations up to 10000 m/s²",
+    ),
+    (
+        trace(row_7="2.5, 1.0"),
+        {},
+        "row 7 is 0 ms after the one before; expected times that increase without gaps",
+    ),
+    (
+        GAP,
+        {},
+        "row 51 is 2 ms after the one before; expected times that increase without gaps, about 0.5 ms apart",
+    ),
+    (
+        HOLES,
+        {},
+        "row 6 is 1 ms after the one before; expected times that increase without gaps, about 0.5 ms apart",
+    ),
+    (
+        trace(row_7="-3.0, 1.0"),
+        {},
+        "row 7 is -5.5 ms after the one before; expected times that increase without gaps",
+    ),
+    (
+        trace(step=-0.5),
+        {},
+        "times decrease from row to row; expected the first measurement in the first row",
+    ),
     (STAMPS, {}, "times repeat: rows 1 and 2 are both at 0 ms; expected times with more digits"),
     (DEAD, {}, "the acceleration is constant, as from a dead sensor; expected one that changes"),
     (FAINT, {}, "expected an acceleration of 1e-09 m/s² or more, found 3.9e-309 m/s²"),
     (trace(rows=9), {}, "has 9 rows; expected 16 to 100000"),
-    (trace(rows=40, step=4.0), {}, "rows are too far apart, or too noisy: leaving out every second one changes the ac"),
-    (trace(rows=20), {}, "expected at least 3 periods of its strongest line, found 1: the offset of the sensor"),
+    (
+        trace(rows=40, step=4.0),
+        {},
+        "rows are too far apart, or too noisy: leaving out every second one changes the ac",
+    ),
+    (
+        trace(rows=20),
+        {},
+        "expected at least 3 periods of its strongest line, found 1: the offset of the sensor",
+    ),
     (trace(), {}, "run.cycles = 24: expected at most 3 cycles: drive.record has no more"),
-    (trace(), {"ramp": [["0 s", 0], ["0.01 s", 0]]}, 'drive.ramp = [["0 s", 0], ["0.01 s", 0]]: expected a factor abo'),
+    (
+        trace(),
+        {"ramp": [["0 s", 0], ["0.01 s", 0]]},
+        'drive.ramp = [["0 s", 0], ["0.01 s", 0]]: expected a factor abo',
+    ),
     (trace(rows=14_000, step=3e-3), {}, "its rows, 3 us apart, are closer than the time step, 3.9"),
-    (trace(), {"repeats": True}, "repeats = true: expected a record that ends with the first row of the next period"),
-    (trace(), {"frequency": "80 Hz"}, 'drive.record = "record.csv": expected either frequency or record, not both'),
+    (
+        trace(),
+        {"repeats": True},
+        "repeats = true: expected a record that ends with the first row of the next period",
+    ),
+    (
+        trace(),
+        {"frequency": "80 Hz"},
+        'drive.record = "record.csv": expected either frequency or record, not both',
+    ),
     (trace(), HARMONICS, 'drive.record = "record.csv": expected none beside drive.harmonics'),
-    (trace(), {"record": "none.csv"}, 'drive.record = "none.csv": cannot be read: No such file or directory'),
+    (
+        trace(),
+        {"record": "none.csv"},
+        'drive.record = "none.csv": cannot be read: No such file or directory',
+    ),
 ]
 FILES: list[tuple[Files, str, str]] = [
     # No TOML, or no case
     ({"bad.toml": "[dimers\nradii = 3"}, "show bad.toml", "bad.toml: not TOML: "),
-    ({"bad.toml": b'[dimers]\nradii = ["0.3 mm", \xff]'}, "show bad.toml", "bad.toml: expected UTF-8 text"),
+    (
+        {"bad.toml": b'[dimers]\nradii = ["0.3 mm", \xff]'},
+        "show bad.toml",
+        "bad.toml: expected UTF-8 text",
+    ),
     ({"bad.toml": "a = " + "[" * 5000}, "show bad.toml", "bad.toml: not TOML: "),
     # What is long, or has control characters
     ({}, f"show fig1b --set drive.frequency={LONG}", 'fig1b: drive.frequency = "xxx'),
@@ -380,7 +518,9 @@ COMMANDS: list[tuple[str, str]] = [
 
 
 def _said(tables: dict[str, Any]) -> dict[str, Any]:
-    said = {key: _said(value) if isinstance(value, dict) else value for key, value in tables.items()}
+    said = {
+        key: _said(value) if isinstance(value, dict) else value for key, value in tables.items()
+    }
     return {key: value for key, value in said.items() if value is not None}
 
 
@@ -390,9 +530,17 @@ def _bad(told: str, files: Files, **tables: Any) -> tuple[Files, str, str]:
 
 ROWS: list[tuple[Files, str, str]] = [
     *(_bad(told, {}, **tables) for tables, told in CASES),
-    *(_bad(told, {"record.csv": text}, drive={**NO_SINE, **drive}) for text, drive, told in RECORDS),
     *(
-        _bad(told, {"own.obj": mesh} if mesh else {}, **others, boundary={"material": "glass", **boundary})
+        _bad(told, {"record.csv": text}, drive={**NO_SINE, **drive})
+        for text, drive, told in RECORDS
+    ),
+    *(
+        _bad(
+            told,
+            {"own.obj": mesh} if mesh else {},
+            **others,
+            boundary={"material": "glass", **boundary},
+        )
         for mesh, boundary, others, told in VESSELS
     ),
     *(({"library.toml": text}, "show fig1b", told) for text, told in LIBRARIES),
@@ -410,7 +558,9 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[str], Pat
         (tmp_path / folder).mkdir()
         (tmp_path / folder / file).write_text("{") if file else None
     for file, values in (("mine", '"60 Hz"'), ("bad_sweep", '"60 Hz", "0 Hz"')):
-        (tmp_path / f"{file}.toml").write_text(f'case = "fig1b"\naxes.drive.frequency = [{values}]\n')
+        (tmp_path / f"{file}.toml").write_text(
+            f'case = "fig1b"\naxes.drive.frequency = [{values}]\n'
+        )
 
     def found(name: str) -> Path:
         if name in ("pile", "archive"):
@@ -424,16 +574,24 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[str], Pat
     return found
 
 
-@pytest.mark.parametrize(("files", "command", "told"), ROWS, ids=[f"{one[:50]}: {told[:50]}" for _, one, told in ROWS])
-def test_bad_input(files: Files, command: str, told: str, place: Callable[[str], Path], tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("files", "command", "told"), ROWS, ids=[f"{one[:50]}: {told[:50]}" for _, one, told in ROWS]
+)
+def test_bad_input(
+    files: Files, command: str, told: str, place: Callable[[str], Path], tmp_path: Path
+) -> None:
     for name, contents in files.items():
-        (tmp_path / name).write_bytes(contents if isinstance(contents, bytes) else contents.encode())
+        (tmp_path / name).write_bytes(
+            contents if isinstance(contents, bytes) else contents.encode()
+        )
     places = {name: place(name) for _, name, _, _ in Formatter().parse(command) if name}
     folders = [tmp_path, *(path for path in places.values() if path.is_dir())]
     before = [sorted(folder.rglob("*")) for folder in folders]
     done = call(*shlex.split(command.format(**places)), folder=tmp_path)
     mistakes = told.split("\n")
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", len(mistakes)), done.stderr
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", len(mistakes)), (
+        done.stderr
+    )
     assert all(one in done.stderr for one in mistakes), done.stderr
     assert done.stderr.replace("\n", "").isprintable()
     assert len(done.stderr) < 1500 * len(mistakes)

@@ -35,7 +35,11 @@ def _run(folder: Path, *, stopped: bool = False) -> None:
     """Run a deck as its script says, to its end or until it has written frames."""
     engine = subprocess.Popen(["sh", "run.sh"], cwd=folder)
     if stopped:
-        wait_for(lambda: (folder / "beads.bin").exists() and (folder / "beads.bin").stat().st_size > 10_000)
+        wait_for(
+            lambda: (
+                (folder / "beads.bin").exists() and (folder / "beads.bin").stat().st_size > 10_000
+            )
+        )
         engine.kill()
     engine.wait()
 
@@ -47,15 +51,22 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "hand"
 
 
-def test_a_deck_run_by_hand_is_read_and_says_so(folder: Path, run_directory: Callable[..., Path]) -> None:
+def test_a_deck_run_by_hand_is_read_and_says_so(
+    folder: Path, run_directory: Callable[..., Path]
+) -> None:
     with pytest.raises(InputError, match=r"the deck was not run .*; do: cd .* && sh run\.sh"):
         run_case(folder)
     _run(folder)
     found, same = run_case(folder), run_case(run_directory(run=SHORT))
     assert found.result.about["by_hand"] == ["run by hand"]
     assert {**found.result, "by_hand": 0} == {**same.result, "by_hand": 0}
-    assert (folder / "beads.bin").read_bytes() == (same.directory / FIRST_SEGMENT / "beads.bin").read_bytes()
-    assert ("warning: run by hand" in found.describe(), "(already run)" in found.describe()) == (True, False)
+    assert (folder / "beads.bin").read_bytes() == (
+        same.directory / FIRST_SEGMENT / "beads.bin"
+    ).read_bytes()
+    assert ("warning: run by hand" in found.describe(), "(already run)" in found.describe()) == (
+        True,
+        False,
+    )
     assert found.case.document == make_case(run=SHORT).document
     for command in ("run", "plot", "export --to vtk", "check files"):
         assert call(*command.split(), str(folder)).returncode == 0, command
@@ -69,10 +80,19 @@ TONES = [
     {"axis": "y", "frequency": "160 Hz", "peak_acceleration": "1 g", "phase": "90 deg"},
 ]
 PEAK = changed_case(make_case(), {"drive.gamma0": 0.4}).drive.peak_acceleration
-LIQUID = {"volume_fraction": 0.01, "contact_angle": "0 deg", "surface_tension": "20 mN/m", "density": "1 g/cm^3"}
+LIQUID = {
+    "volume_fraction": 0.01,
+    "contact_angle": "0 deg",
+    "surface_tension": "20 mN/m",
+    "density": "1 g/cm^3",
+}
 EDITED: dict[str, tuple[dict[str, Any], dict[str, str], dict[str, Any]]] = {
     # Tables of a case, edits of its deck, the same changes of the case.
-    "amplitude": ({}, {"amplitude": "1.16e-4"}, {"drive.peak_acceleration": f"{1.16e-4 * (160.0 * pi) ** 2!r} m/s^2"}),
+    "amplitude": (
+        {},
+        {"amplitude": "1.16e-4"},
+        {"drive.peak_acceleration": f"{1.16e-4 * (160.0 * pi) ** 2!r} m/s^2"},
+    ),
     "frictions": (
         {},
         {"friction_bead_wall": "0.2", "restitution": "0.5"},
@@ -114,25 +134,50 @@ EDITED: dict[str, tuple[dict[str, Any], dict[str, str], dict[str, Any]]] = {
 
 def _numbers(case: Case) -> list[float]:
     """What parameters of a deck determine; the last four are those of the run's length and samples."""
-    liquid, contact, run, sines = case.liquid.of_bridges, case.contact, case.run, case.excitation.harmonics
-    numbers = [number for one in sines for number in (*one.direction, one.frequency, one.peak_acceleration, one.phase)]
-    numbers += [case.beads.density, case.environment.gravity, liquid.surface_tension, liquid.viscosity, run.period]
-    numbers += [contact.friction.bead_bead, contact.friction.bead_wall, contact.restitution, contact.youngs_modulus]
+    liquid, contact, run, sines = (
+        case.liquid.of_bridges,
+        case.contact,
+        case.run,
+        case.excitation.harmonics,
+    )
+    numbers = [
+        number
+        for one in sines
+        for number in (*one.direction, one.frequency, one.peak_acceleration, one.phase)
+    ]
+    numbers += [
+        case.beads.density,
+        case.environment.gravity,
+        liquid.surface_tension,
+        liquid.viscosity,
+        run.period,
+    ]
+    numbers += [
+        contact.friction.bead_bead,
+        contact.friction.bead_wall,
+        contact.restitution,
+        contact.youngs_modulus,
+    ]
     return [*numbers, run.cycles, run.settling_cycles, run.samples_per_cycle, run.cycles_per_sample]
 
 
 @pytest.mark.parametrize("name", EDITED)
-def test_an_edited_deck_is_another_case(name: str, tmp_path: Path, run_directory: Callable[..., Path]) -> None:
+def test_an_edited_deck_is_another_case(
+    name: str, tmp_path: Path, run_directory: Callable[..., Path]
+) -> None:
     tables, edits, changes = EDITED[name]
     case, expected = (
-        build_case(changed(CaseFile, {**document(run=SHORT), **tables}, more), name="test") for more in ({}, changes)
+        build_case(changed(CaseFile, {**document(run=SHORT), **tables}, more), name="test")
+        for more in ({}, changes)
     )
     folder = write_folder(case, tmp_path / "hand").parent
     _edit(folder, **edits)
     _run(folder)
     found = run_case(folder)
     assert _numbers(found.case) == pytest.approx(_numbers(expected), rel=1e-9)
-    assert found.case.run.steps_per_cycle == int(edits.get("steps_per_cycle", case.run.steps_per_cycle))
+    assert found.case.run.steps_per_cycle == int(
+        edits.get("steps_per_cycle", case.run.steps_per_cycle)
+    )
     assert [one.spacing for one in found.case.walkers] == [one.spacing for one in case.walkers]
     assert found.case.drive.ramp == expected.drive.ramp
     # Its tables are those of a case file.
@@ -147,7 +192,9 @@ def test_an_edited_deck_is_another_case(name: str, tmp_path: Path, run_directory
         same = run_case(run_directory(expected))
         assert found.result["velocity"] == pytest.approx(same.result["velocity"], rel=1e-2)
         # What commands list: the edits, which are given, and nothing else.
-        (left, _), (right, _) = (differing([*map(flattened, (case, other))]) for other in (found.case, expected))
+        (left, _), (right, _) = (
+            differing([*map(flattened, (case, other))]) for other in (found.case, expected)
+        )
         assert {*left} - {"run.settling_cycles"} == {*right} - {"run.settling_cycles"}
 
 
@@ -156,7 +203,11 @@ def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None
     first = run_case(folder).result["velocity"]
     _edit(folder, peak_acceleration="20.0")
     deck = folder / "walker.lig"
-    deck.write_text(deck.read_text().replace("nve/sphere", "nve/sphere  # as ever").replace("delay 0", "delay 1"))
+    deck.write_text(
+        deck.read_text()
+        .replace("nve/sphere", "nve/sphere  # as ever")
+        .replace("delay 0", "delay 1")
+    )
     _run(folder)
     again = run_case(folder)
     assert again.result["velocity"] < first
@@ -171,10 +222,22 @@ def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None
 FAILS: dict[str, tuple[dict[str, str], str, str]] = {
     # Edits of parameters, a wrong command instead of pair_coeff, what is said.
     "an error of the engine": ({}, "pair_coeff * * 3", "failed: the engine stopped: ERROR"),
-    "steps that are no cycle": ({"time_step": "3e-6"}, "", "not one cycle of 80 Hz .*edit steps_per_cycle"),
+    "steps that are no cycle": (
+        {"time_step": "3e-6"},
+        "",
+        "not one cycle of 80 Hz .*edit steps_per_cycle",
+    ),
     "a word for a number": ({"restitution": "high"}, "", "cannot be read .*'high'"),
-    "a value that no case has": ({"youngs_modulus": "2e6"}, "", r"the edited deck: contact\.youngs_modulus = \"2"),
-    "a run that was stopped": ({"cycles": "4000", "peak_acceleration": "1.0"}, "", "still runs or was stopped"),
+    "a value that no case has": (
+        {"youngs_modulus": "2e6"},
+        "",
+        r"the edited deck: contact\.youngs_modulus = \"2",
+    ),
+    "a run that was stopped": (
+        {"cycles": "4000", "peak_acceleration": "1.0"},
+        "",
+        "still runs or was stopped",
+    ),
 }
 
 
@@ -183,7 +246,9 @@ def test_a_run_by_hand_that_cannot_be_read_is_told_in_one_message(name: str, fol
     edits, command, told = FAILS[name]
     _edit(folder, **edits)
     deck = folder / "walker.lig"
-    deck.write_text(deck.read_text().replace("pair_coeff      * *", command or "pair_coeff      * *"))
+    deck.write_text(
+        deck.read_text().replace("pair_coeff      * *", command or "pair_coeff      * *")
+    )
     _run(folder, stopped=name == "a run that was stopped")
     with pytest.raises(InputError, match=told) as caught:
         take_in(folder)

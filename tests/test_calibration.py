@@ -22,7 +22,13 @@ from walkers.arrays import FloatArray
 from walkers.calibration.calibrate import PROPOSED, Outcome, calibrate, nearest
 from walkers.calibration.emulator import LARGEST, Emulator, Posterior, middle
 from walkers.calibration.file import Calibration, Parameter, load_calibration, read_calibration
-from walkers.calibration.observations import NO_NUMBERS, Observation, misalignment, numbers_in, numbers_of
+from walkers.calibration.observations import (
+    NO_NUMBERS,
+    Observation,
+    misalignment,
+    numbers_in,
+    numbers_of,
+)
 from walkers.calibration.report import draw_facts, record_of, summary
 from walkers.errors import InputError
 from walkers.inputs.axes import unit_cube
@@ -46,7 +52,12 @@ FACTS = [  # what is said, number, distance in deviations, text
     ({"least": 1.0, "over": ["two"]}, 1.7, 0.0, "at least 1 ± 0.1"),
     ({"least": 1.0, "over": ["two"]}, 0.95, -0.5, "at least 1 ± 0.1"),
     ({"most": 0.15, "quantity": "slip_1"}, 0.35, 2.0, "at most 0.15 ± 0.1"),
-    ({"least": 0.2, "most": 0.4, "quantity": "slip_2"}, 0.3, 0.0, "at least 0.2 and at most 0.4 ± 0.1"),
+    (
+        {"least": 0.2, "most": 0.4, "quantity": "slip_2"},
+        0.3,
+        0.0,
+        "at least 0.2 and at most 0.4 ± 0.1",
+    ),
     ({"value": 90.0, "deviation": 10.0, "quantity": "smallest_angle"}, 79.0, -1.1, "90 ± 10 °"),
 ]
 
@@ -61,7 +72,10 @@ def test_a_number_agrees_within_a_deviation_of_what_is_said(
 
 
 def test_numbers_are_means_and_ratios_of_means() -> None:
-    numbers = {name: {**NO_NUMBERS, "velocity": v, "slip_1": s} for name, v, s in [("a", 2e-3, 0.1), ("b", 4e-3, 0.0)]}
+    numbers = {
+        name: {**NO_NUMBERS, "velocity": v, "slip_1": s}
+        for name, v, s in [("a", 2e-3, 0.1), ("b", 4e-3, 0.0)]
+    }
     numbers["rest"] = {**NO_NUMBERS, "velocity": 1e-8}
     for given, expected in [
         ({"of": ["a", "b"]}, 3e-3),
@@ -111,7 +125,10 @@ DESIGN, TRUTH = unit_cube(2, 64, 1), np.array([[0.4, 0.6]])
 @pytest.fixture(scope="module")
 def emulators() -> tuple[Emulator, ...]:
     each = zip("ab", known(TRUTH)[0], known(DESIGN).T, strict=True)
-    return tuple(Emulator.of(fact(name, value=value, deviation=0.2), DESIGN, column, 1) for name, value, column in each)
+    return tuple(
+        Emulator.of(fact(name, value=value, deviation=0.2), DESIGN, column, 1)
+        for name, value, column in each
+    )
 
 
 def test_emulators_know_their_error(emulators: tuple[Emulator, ...]) -> None:
@@ -130,19 +147,27 @@ def test_emulators_know_their_error(emulators: tuple[Emulator, ...]) -> None:
     for place in range(64):
         others = np.arange(64) != place
         one = copy.deepcopy(noisy.process).set_params(kernel=noisy.process.kernel_, optimizer=None)
-        left.append(numbers[place] - one.fit(DESIGN[others], numbers[others]).predict(DESIGN[[place]])[0])
+        left.append(
+            numbers[place] - one.fit(DESIGN[others], numbers[others]).predict(DESIGN[[place]])[0]
+        )
     # Without its own share in the mean and the scale.
     assert 10.0 * np.sqrt(np.mean(np.square(left))) == pytest.approx(noisy.error, rel=0.1)
 
 
-@pytest.mark.parametrize(("given", "far"), [("value", -LARGEST), ("least", -LARGEST), ("most", LARGEST)])
+@pytest.mark.parametrize(
+    ("given", "far"), [("value", -LARGEST), ("least", -LARGEST), ("most", LARGEST)]
+)
 def test_what_does_not_exist_is_far_off(given: str, far: float) -> None:
     outcome = np.where(DESIGN[:, 0] > 0.5, np.nan, 1.0)
     emulator = Emulator.of(fact(**{given: 1.0}), DESIGN, outcome, 1)
-    assert emulator.predict(np.array([[0.1, 0.5], [0.9, 0.5]]))[0] == pytest.approx([0.0, far], abs=1.0)
+    assert emulator.predict(np.array([[0.1, 0.5], [0.9, 0.5]]))[0] == pytest.approx(
+        [0.0, far], abs=1.0
+    )
 
 
-def test_likelihoods_are_students_of_the_distance_and_of_the_side_of_a_limit(emulators: tuple[Emulator, ...]) -> None:
+def test_likelihoods_are_students_of_the_distance_and_of_the_side_of_a_limit(
+    emulators: tuple[Emulator, ...],
+) -> None:
     at, value = np.array([[0.1, 0.2], [0.8, 0.7]]), known(TRUTH)[0, 0]
     mean, error = emulators[0].predict(at)
     expected = student(4.0, loc=mean, scale=np.hypot(1.0, error))
@@ -159,7 +184,9 @@ def test_likelihoods_are_students_of_the_distance_and_of_the_side_of_a_limit(emu
         np.testing.assert_allclose(np.exp(likelihood), probability)
 
 
-def test_the_posterior_is_that_of_a_grid_and_of_what_is_used(emulators: tuple[Emulator, ...]) -> None:
+def test_the_posterior_is_that_of_a_grid_and_of_what_is_used(
+    emulators: tuple[Emulator, ...],
+) -> None:
     posterior = Posterior.of(emulators, 1 << 14, 1)
     grid = np.stack(np.meshgrid(*[np.linspace(0.005, 0.995, 100)] * 2), axis=-1).reshape(-1, 2)
     weight = np.exp(np.sum([one.log_likelihood(grid) for one in emulators], axis=0))
@@ -168,16 +195,24 @@ def test_the_posterior_is_that_of_a_grid_and_of_what_is_used(emulators: tuple[Em
     spread = np.sqrt(weight @ (grid - mean) ** 2 / weight.sum())
     np.testing.assert_allclose(posterior.samples.std(axis=0), spread, rtol=0.05)
     np.testing.assert_allclose(posterior.best, TRUTH[0], atol=0.05)
-    assert posterior.effective_samples == pytest.approx(weight.sum() ** 2 / np.sum(weight**2) * 1.6384, rel=0.05)
+    assert posterior.effective_samples == pytest.approx(
+        weight.sum() ** 2 / np.sum(weight**2) * 1.6384, rel=0.05
+    )
     without = Posterior.of(emulators, 1 << 12, 1, "b")
-    narrow, wide = (emulators[1].numbers(one.samples, np.zeros(4000)).std() for one in (posterior, without))
+    narrow, wide = (
+        emulators[1].numbers(one.samples, np.zeros(4000)).std() for one in (posterior, without)
+    )
     assert wide > 1.5 * narrow
     derived = replace(emulators[1], observation=fact("b", value=1.0, derived=True))
-    np.testing.assert_array_equal(Posterior.of([emulators[0], derived], 1 << 12, 1).samples, without.samples)
+    np.testing.assert_array_equal(
+        Posterior.of([emulators[0], derived], 1 << 12, 1).samples, without.samples
+    )
 
 
 def test_the_nearest_set_has_the_least_misfit_of_what_has_a_weight() -> None:
-    away = np.array([[0.0, 0.0, 5.0, 5.0], [0.9, 0.9, 0.9, 3.0], [0.9, 0.2, 0.2, 2.0], [0.2, 0.2, 0.2, np.nan]])
+    away = np.array(
+        [[0.0, 0.0, 5.0, 5.0], [0.9, 0.9, 0.9, 3.0], [0.9, 0.2, 0.2, 2.0], [0.2, 0.2, 0.2, np.nan]]
+    )
     for weight, best in [({}, 2), ({"derived": True}, 3), ({"costly": True}, 3)]:
         facts = [*(fact(name, value=1.0) for name in "abc"), fact("d", value=1.0, **weight)]
         assert nearest(facts, 1.0 + 0.1 * away) == best
@@ -214,12 +249,25 @@ held_out = ["r"]
 def reduced(speeds: dict[str, float], slip: float = 0.3) -> dict[str, Any]:
     """The reduced calibration with facts: three speeds (m/s), the ratio of two, and the sliding of a bead."""
     facts: list[dict[str, Any]] = [
-        {"name": name, "group": "v", "of": [name], "value": f"{speed} m/s", "deviation": f"{0.08 * speed} m/s"}
+        {
+            "name": name,
+            "group": "v",
+            "of": [name],
+            "value": f"{speed} m/s",
+            "deviation": f"{0.08 * speed} m/s",
+        }
         for name, speed in speeds.items()
     ]
     ratio = {"name": "ratio", "group": "r", "of": ["fast"], "over": ["slow"], "deviation": 0.05}
     ratio["value"] = speeds["fast"] / speeds["slow"]
-    slides = {"name": "slip", "group": "v", "quantity": "slip_1", "of": ["strong"], "value": slip, "deviation": 0.04}
+    slides = {
+        "name": "slip",
+        "group": "v",
+        "quantity": "slip_1",
+        "of": ["strong"],
+        "value": slip,
+        "deviation": 0.04,
+    }
     return {**copy.deepcopy(REDUCED), "observations": [*facts, ratio, slides]}
 
 
@@ -229,7 +277,9 @@ def small(folder: Path, **changes: Any) -> Calibration:
     return read_calibration(document, source="small", name="small", folder=folder)
 
 
-def numbers(found: Calibration, values: list[float], out: Path, options: Options) -> dict[str, dict[str, float]]:
+def numbers(
+    found: Calibration, values: list[float], out: Path, options: Options
+) -> dict[str, dict[str, float]]:
     """Quantities of the experiments at a parameter set."""
     record, _ = run_sweep(found.sweep("one", np.array([values])), out, options)
     return dict(zip(found.experiments, numbers_in(load(record.directory)), strict=True))
@@ -240,8 +290,12 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     """Within a quarter; the second time nothing is run."""
     out, to = tmp_path / "runs", tmp_path / "runs" / "reduced"
     seen = numbers(small(tmp_path), list(TRUE.values()), out, Options(2))
-    document = reduced({name: one["velocity"] for name, one in seen.items()}, seen["strong"]["slip_1"])
-    document["observations"].append({**document["observations"][0], "name": "again", "derived": True})
+    document = reduced(
+        {name: one["velocity"] for name, one in seen.items()}, seen["strong"]["slip_1"]
+    )
+    document["observations"].append(
+        {**document["observations"][0], "name": "again", "derived": True}
+    )
     file = tmp_path / "reduced.toml"
     file.write_text(to_toml(document))
     told = call("calibrate", str(file), "--out", str(out), check=True).stdout
@@ -256,13 +310,18 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     for name, true in TRUE.items():
         low, middle, high = said["posterior"][name]
         assert low < true < high, name
-        assert [middle, said["sets"][PROPOSED[0]][name]] == pytest.approx([true, true], rel=0.25), name
+        assert [middle, said["sets"][PROPOSED[0]][name]] == pytest.approx([true, true], rel=0.25), (
+            name
+        )
         assert f"{middle:.3g} ({low:.3g} to {high:.3g})" in summary
     assert said["agree"]["guess"] < said["agree"][PROPOSED[0]]
     assert f"{said['agree']['guess']} of 5 measured facts agree within their deviation" in summary
     best, values = load_case(to / "best.toml"), said["sets"][PROPOSED[0]]
     assert best.contact.friction.bead_wall == pytest.approx(values["friction"], rel=1e-3)
-    for key, name in (("contact.friction.bead_bead", "friction"), ("liquid.viscosity_ratio", "drag")):
+    for key, name in (
+        ("contact.friction.bead_bead", "friction"),
+        ("liquid.viscosity_ratio", "drag"),
+    ):
         low, _, high = said["posterior"][name]
         ends = min(low, values[name]), max(high, values[name])
         assert best.uncertain[key]["loguniform"] == pytest.approx(ends, rel=1e-3)
@@ -271,7 +330,9 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     assert predicted["ratio"][0] < document["observations"][3]["value"] < predicted.pop("ratio")[2]
     assert not predicted
     runs = {path.name: path.stat().st_mtime_ns for path in out.glob("*/manifest.json")}
-    assert len([*out.glob("*/segments/*/beads.bin")]) == len(seen)  # of the runs that the calibration did not make
+    assert len([*out.glob("*/segments/*/beads.bin")]) == len(
+        seen
+    )  # of the runs that the calibration did not make
     again = calibrate(load_calibration(file), out, Options(2))
     assert {path.name: path.stat().st_mtime_ns for path in out.glob("*/manifest.json")} == runs
     assert json.loads(json.dumps(record_of(again))) == said
@@ -280,7 +341,12 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
 
 def test_a_bead_that_cannot_slide_rolls_and_one_without_friction_is_dragged(tmp_path: Path) -> None:
     """What a walker is like within the cycle, and that means are those of its table."""
-    found = small(tmp_path, experiments={"slow": {"drive.peak_acceleration": "6 g"}}, observations=[LONE], design={})
+    found = small(
+        tmp_path,
+        experiments={"slow": {"drive.peak_acceleration": "6 g"}},
+        observations=[LONE],
+        design={},
+    )
     rough = numbers(found, [0.2, 0.5], tmp_path / "runs", Options(2))["slow"]
     smooth = numbers(found, [0.06, 2.0], tmp_path / "runs", Options(2))["slow"]
     assert rough["slip_1"] < 0.02
@@ -300,19 +366,28 @@ def test_a_run_that_ended_early_slides_as_one_of_so_many_cycles(tmp_path: Path) 
     # There is nothing to be observed of walkers that came apart.
     with recomputed(early.directory, ["walkers.parquet"]):
         columns = read_columns(early.directory, "walkers")
-        write_table(early.directory, "walkers", columns | {"separated_fraction": columns["separated_fraction"] + 0.5})
+        write_table(
+            early.directory,
+            "walkers",
+            columns | {"separated_fraction": columns["separated_fraction"] + 0.5},
+        )
     assert np.isnan([*numbers_of(early.directory).values()]).all()
 
 
 LONE = {"name": "v", "group": "v", "of": ["slow"], "value": "1 mm/s", "deviation": "1 mm/s"}
 
 
-def test_a_walker_that_still_turns_is_observed_by_its_angle_alone(run_directory: Callable[..., Path]) -> None:
+def test_a_walker_that_still_turns_is_observed_by_its_angle_alone(
+    run_directory: Callable[..., Path],
+) -> None:
     """It starts across the drive; the other numbers are those of the steady walker beside it, as it walks alone."""
     start = {"facing": "right", "gap_spread": 0.0, "angle_spread": "90 deg"}
     times = {"cycles": 12, "settling_cycles": 6, "samples_per_cycle": 20, "seed": 39}
     changes = {"run": times, "drive": {"peak_acceleration": "3 g"}}
-    both, alone = (numbers_of(run_directory(dimers={**start, "replicates": count}, **changes)) for count in (2, 1))
+    both, alone = (
+        numbers_of(run_directory(dimers={**start, "replicates": count}, **changes))
+        for count in (2, 1)
+    )
     assert both.pop("largest_angle") > 30.0
     assert alone.pop("largest_angle") < 1.0
     assert both == pytest.approx(alone, rel=1e-6)
@@ -326,29 +401,55 @@ def test_the_record_has_quantiles_and_agreement_of_a_known_outcome(
 ) -> None:
     """A posterior even in the first parameter from 0.4 to 0.6 of its range and in the second over all."""
     number = np.arange(4096) / 4096.0
-    even = Posterior(np.stack([0.4 + 0.2 * number, number], axis=1), np.full(4096, -np.log(4096.0)), 1)
+    even = Posterior(
+        np.stack([0.4 + 0.2 * number, number], axis=1), np.full(4096, -np.log(4096.0)), 1
+    )
     one, other = (emulator.observation for emulator in emulators)
     rows = known(TRUTH) + 0.2 * np.array([[1.5, -0.9], [0.5, np.nan], [0.9, 0.9]])
     calibration = small(tmp_path)
     parameters = calibration.file.parameters
     parameters["drag"] = parameters["friction"].but(range=(0.4, 10.0))
     design = calibration.file.design.but(held_out=["b"])
-    calibration = replace(calibration, file=calibration.file.but(observations=[one, other], design=design))
+    calibration = replace(
+        calibration, file=calibration.file.but(observations=[one, other], design=design)
+    )
     without = Posterior(np.array([[0.9, 0.5]]), np.zeros(1), 1)  # what is held out
     names = ("guess", *PROPOSED[::2])
-    sets, seen = zip(names, [[0.5, 0.5], [0.1, 0.1], [0.9, 0.9]], strict=True), zip(names, rows, strict=True)
+    sets, seen = (
+        zip(names, [[0.5, 0.5], [0.1, 0.1], [0.9, 0.9]], strict=True),
+        zip(names, rows, strict=True),
+    )
     unit = {name: np.array(row) for name, row in sets}
     found = record_of(
-        Outcome(calibration, unit, dict(seen), 10, dict(zip("ab", emulators, strict=True)), even, without, {})
+        Outcome(
+            calibration,
+            unit,
+            dict(seen),
+            10,
+            dict(zip("ab", emulators, strict=True)),
+            even,
+            without,
+            {},
+        )
     )
     assert found["sets"]["guess"] == {"friction": pytest.approx(0.1), "drag": pytest.approx(2.0)}
     assert list(found["agree"].values()) == [1, 1, 2]
-    assert found["posterior"]["friction"] == pytest.approx([0.04 * 6.25**at for at in (0.41, 0.5, 0.59)], rel=1e-3)
-    assert found["prior"]["friction"] == pytest.approx([0.04 * 6.25**at for at in (0.05, 0.5, 0.95)])
+    assert found["posterior"]["friction"] == pytest.approx(
+        [0.04 * 6.25**at for at in (0.41, 0.5, 0.59)], rel=1e-3
+    )
+    assert found["prior"]["friction"] == pytest.approx(
+        [0.04 * 6.25**at for at in (0.05, 0.5, 0.95)]
+    )
     # Both set the same keys: 25^y/6.25^(0.4 + 0.2 y), that is 10/0.04 ... of equal quantiles.
-    ratios = 10.0 * 25.0 ** np.array([0.05, 0.5, 0.95]) / 6.25 ** (0.4 + 0.2 * np.array([0.05, 0.5, 0.95]))
+    ratios = (
+        10.0
+        * 25.0 ** np.array([0.05, 0.5, 0.95])
+        / 6.25 ** (0.4 + 0.2 * np.array([0.05, 0.5, 0.95]))
+    )
     assert found["posterior"]["drag/friction"] == pytest.approx(ratios, rel=1e-2)
-    assert found["observations"][0]["numbers"]["guess"] == pytest.approx(1e3 * (known(TRUTH)[0, 0] + 0.3))
+    assert found["observations"][0]["numbers"]["guess"] == pytest.approx(
+        1e3 * (known(TRUTH)[0, 0] + 0.3)
+    )
     assert found["observations"][1]["numbers"][PROPOSED[0]] is None
     predicted = [row["predicted"] for row in found["observations"]]
     assert predicted == [None, pytest.approx([1e3 * known(without.points)[0, 1]] * 3, rel=0.02)]
@@ -376,7 +477,9 @@ def test_values_have_their_units_and_experiments_what_all_set(tmp_path: Path) ->
 def test_the_example_of_the_docs_can_be_read(tmp_path: Path) -> None:
     page = (Path(__file__).parents[1] / "docs" / "how-to" / "calibrate.md").read_text()
     document = tomllib.loads(page.split("```toml\n")[1].split("```")[0])
-    found = read_calibration({**document, "case": "fig1b"}, source="docs", name="docs", folder=tmp_path)
+    found = read_calibration(
+        {**document, "case": "fig1b"}, source="docs", name="docs", folder=tmp_path
+    )
     assert {one.group for one in found.file.observations} == {"speeds"}
 
 
@@ -422,7 +525,9 @@ _SET = {"friction": 0.1, "drag": 1.0}
         ("design/held_out", ["v"], r"observations: expected one that is neither"),  # all but what is derived
     ],
 )  # fmt: skip
-def test_a_bad_calibration_is_told_by_its_key(path: str, value: Any, told: str, tmp_path: Path) -> None:
+def test_a_bad_calibration_is_told_by_its_key(
+    path: str, value: Any, told: str, tmp_path: Path
+) -> None:
     document = reduced({"slow": 1e-3, "fast": 1e-3, "strong": 1e-3})
     document["observations"][3]["derived"] = True
     *tables, key = path.split("/")
@@ -434,7 +539,9 @@ def test_a_bad_calibration_is_told_by_its_key(path: str, value: Any, told: str, 
         read_calibration(document, source="bad.toml", name="bad", folder=tmp_path)
 
 
-def test_calibrations_that_make_no_sense_are_refused_before_anything_is_written(tmp_path: Path) -> None:
+def test_calibrations_that_make_no_sense_are_refused_before_anything_is_written(
+    tmp_path: Path,
+) -> None:
     """A value of their range that a case refuses; a case without dimers."""
     drag = {"keys": ["contact.restitution"], "range": [0.01, 0.9]}
     beyond = {"parameters": REDUCED["parameters"] | {"drag": drag}, "sets": {}}

@@ -62,7 +62,9 @@ from walkers.templates.placement import Bead
 
 RADIUS, STILL = 3e-4, (0.0, 0.0, 0.0)
 NO_BRIDGES = ("capillary", "lubrication")
-DEPTH = hertz_overlap(4.0 / 3.0 * np.pi * RADIUS**3 * 4000.0 * 9.81, RADIUS, reduced_modulus(5e7, 0.3))
+DEPTH = hertz_overlap(
+    4.0 / 3.0 * np.pi * RADIUS**3 * 4000.0 * 9.81, RADIUS, reduced_modulus(5e7, 0.3)
+)
 """Overlap of a bead that lies on a floor."""
 ROLLING = {
     **{"liquid.law": "willett", "environment.gravity": "9.81 m/s^2", "contact.restitution": 0.3},
@@ -108,7 +110,9 @@ def test_a_bead_rolls_to_rest_and_swings_in_a_cylinder() -> None:
     """Rolling friction slows at 5/7 μ_r g; beside the lowest line of a cylinder on its side ω² = 5/7 g/(C - R)."""
     case = bench_case({**ROLLING, "contact.rolling_friction": 0.01})
     speed, slowing = 5e-3, 5.0 / 7.0 * 0.01 * 9.81
-    rolling = one_bead(case, (0.0, 0.0, RADIUS - DEPTH), (speed, 0.0, 0.0), (0.0, speed / RADIUS, 0.0))
+    rolling = one_bead(
+        case, (0.0, 0.0, RADIUS - DEPTH), (speed, 0.0, 0.0), (0.0, speed / RADIUS, 0.0)
+    )
     expected = speed - slowing * 2e-3 * np.arange(1, 26)
     assert rolling.run(50_000, 2000)[:, 0, 3] == pytest.approx(expected, abs=2e-3 * speed)
 
@@ -130,7 +134,9 @@ def test_bridges_are_the_law_between_its_knots() -> None:
     curve = by_name(case.liquid.law)(surfaces)
     for gap in np.linspace(0.0, 0.999 * curve.rupture, 777):
         expected = curve.forces(np.array([gap])).columns()[0]
-        assert kernels.bridge_forces(bridges, bridges.between[0, -1], gap) == pytest.approx(expected, rel=1e-8)
+        assert kernels.bridge_forces(bridges, bridges.between[0, -1], gap) == pytest.approx(
+            expected, rel=1e-8
+        )
 
 
 def test_the_forces_of_a_pair_conserve_momentum_and_angular_momentum() -> None:
@@ -175,16 +181,23 @@ def test_other_kinds_of_cases_agree(name: str, tmp_path: Path) -> None:
     assert compare([run(free, tmp_path).motion])[-1].measured < 1e-4
 
 
-def test_piles_agree_until_they_are_chaotic_and_through_a_restart(pile: dict[str, Any], in_folder: Path) -> None:
+def test_piles_agree_until_they_are_chaotic_and_through_a_restart(
+    pile: dict[str, Any], in_folder: Path
+) -> None:
     """The first of the runs that are compared follows LIGGGHTS through its two restarts, while it settles and after."""
     (in_folder / "pile.toml").write_text(to_toml(pile))
     done = call("check", "pile.toml", "--cycles", "3", "--seeds", "2", "--json", check=True)
     measured = {line["quantity"]: line["measured"] for line in json.loads(done.stdout)["lines"]}
     seed = load_case("pile-ci").run.seed
-    assert all(measured[f"start {seed + number}: cycles of the same motion"] >= 1.0 for number in range(2))
+    assert all(
+        measured[f"start {seed + number}: cycles of the same motion"] >= 1.0 for number in range(2)
+    )
     assert [*measured][:3:2] == ["height of the beads", "touching pairs per bead"]
     first = run(shortened(build_case(pile, name="pile"), 3), Path("runs"))
-    parts = {name: getattr(first.motion, name)[:-1] for name in ("time", "position", "velocity", "spin", "frames")}
+    parts = {
+        name: getattr(first.motion, name)[:-1]
+        for name in ("time", "position", "velocity", "spin", "frames")
+    }
     shaken = replace(first.motion, **parts)
     assert first.cached
     assert len({segment for segment, _ in shaken.frames}) == 3
@@ -218,7 +231,10 @@ def test_walls_are_as_far_as_the_boundary_says(bench: Bench) -> None:
     """Planes in any direction and a cylinder: overlaps and nearest points are those of the case."""
     leaning, hollow = Flat((1e-4, 2e-4, -3e-4), (0.48, -0.36, 0.8), "leaning"), Round(2.5e-3)
     turn, out = 2.0, 2.5e-3 - RADIUS + 1e-6
-    beads = [over(leaning, -1e-6, RADIUS), Bead(0, (out * cos(turn), out * sin(turn), 4e-3), RADIUS)]
+    beads = [
+        over(leaning, -1e-6, RADIUS),
+        Bead(0, (out * cos(turn), out * sin(turn), 4e-3), RADIUS),
+    ]
     rows, places = _rows(bench, prescribed(bench_case({}), standing(beads, [leaning, hollow]), 3))
     assert rows[:, WALL_BRIDGES.index("wall")].tolist() == [0, 1]
     for wall, row, place in zip((leaning, hollow), rows, places, strict=True):
@@ -232,7 +248,12 @@ def test_walls_are_as_far_as_the_boundary_says(bench: Bench) -> None:
 
 def test_a_wall_that_moves_meets_beads_that_do_not(bench: Bench) -> None:
     """A quarter of a cycle, 1 mm up, beads have rested: neighbours are not listed anew, and must be there at first."""
-    up = {"drive.axis": "z", "drive.frame": "lab", "run.time_step": "2 us", "run.samples_per_cycle": 4}
+    up = {
+        "drive.axis": "z",
+        "drive.frame": "lab",
+        "run.time_step": "2 us",
+        "run.samples_per_cycle": 4,
+    }
     peak = {"drive.peak_acceleration": f"{1e-3 * (2.0 * pi * 80.0) ** 2!r} m/s^2"}
     case = bench_case({**DRY, **up, **peak})
     beads = [over(FLOOR, 1e-3 - 1e-6, RADIUS), over(FLOOR, 1e-3 + 1e-6, RADIUS, x=1e-3)]
@@ -257,14 +278,18 @@ REFUSED_WALLS = {
 def test_commands_that_are_refused(bench: Bench, command: str) -> None:
     deck = compose(prescribed(bench_case({}), standing([over(FLOOR, 0.0, RADIUS)]), 3))
     lines = deck.text.replace("&\n", " ").splitlines()
-    changed = [f"fix walls all wall/bridge {command}" if "wall/bridge" in line else line for line in lines]
+    changed = [
+        f"fix walls all wall/bridge {command}" if "wall/bridge" in line else line for line in lines
+    ]
     with pytest.raises(EngineError, match=REFUSED_WALLS[command]):
         bench.run(replace(deck, text="\n".join([*changed, ""])))
 
 
 def test_a_dry_contact_with_a_wall_begins_without_friction(bench: Bench) -> None:
     """Sheared, lifted and put down again, where films are empty: the spring of the first contact has ended."""
-    case = bench_case({"liquid.law": "willett", "contact.friction.bead_wall": 0.3}).put("liquid.conserved", True)
+    case = bench_case({"liquid.law": "willett", "contact.friction.bead_wall": 0.3}).put(
+        "liquid.conserved", True
+    )
     deck = compose(prescribed(case, standing([over(FLOOR, -1e-6, RADIUS, spin=STILL)]), 60))
     empty = deck.text.replace("scalar yes yes no 1.0", "scalar yes yes no 0.0")
     before, _, after = empty.partition("\nrun ")
@@ -336,7 +361,10 @@ def test_a_machine_without_wide_instructions_gives_the_same_bytes(
     """The contact model is compiled for machines with and without AVX, and chooses when it is loaded."""
     case = load_case("cluster", {"run.cycles": 8})
     wide = run(case, own_cache / "wide").motion
-    sources, clones = shutil.copytree(SOURCES, own_cache / "engine"), ', target_clones("avx512f", "avx2", "default")'
+    sources, clones = (
+        shutil.copytree(SOURCES, own_cache / "engine"),
+        ', target_clones("avx512f", "avx2", "default")',
+    )
     text = (SOURCES / "forces.h").read_text()
     assert text.count(clones) == 1
     (sources / "forces.h").write_text(text.replace(clones, ""))
@@ -346,9 +374,13 @@ def test_a_machine_without_wide_instructions_gives_the_same_bytes(
         assert np.array_equal(getattr(wide, name), getattr(narrow, name)), name
 
 
-def test_an_engine_that_fails_in_a_check_fails_the_check(own_cache: Path, front: Callable[[str], str]) -> None:
+def test_an_engine_that_fails_in_a_check_fails_the_check(
+    own_cache: Path, front: Callable[[str], str]
+) -> None:
     """Whatever it is asked for, but its version. What a machine cannot run is not kept as the binary's fault."""
-    broken = front('echo "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, x)"\necho ERROR: out of order\nexit 1')
+    broken = front(
+        'echo "LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, x)"\necho ERROR: out of order\nexit 1'
+    )
     engine = find_engine(broken)
     (failed,), version = run_audit(["stock"], engine=engine)
     assert "out of order" in failed.quantity
@@ -409,7 +441,9 @@ def test_an_engine_whose_check_failed_is_refused(own_cache: Path) -> None:
     assert "another binary by --engine or WALKERS_ENGINE" in told
     with pytest.raises(AuditFailed, match="Hertz force"):
         run(make_case(run=SHORT), own_cache / "runs")
-    (own_cache / "sweep.toml").write_text('case = "case.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+    (own_cache / "sweep.toml").write_text(
+        'case = "case.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n'
+    )
     swept = call("sweep", "sweep.toml", folder=own_cache)
     assert (swept.returncode, "first: Hertz force" in swept.stderr) == (1, True)
     assert not (own_cache / "runs").exists()
@@ -418,7 +452,12 @@ def test_an_engine_whose_check_failed_is_refused(own_cache: Path) -> None:
 def test_another_build_of_the_contact_model_is_audited_anew(own_cache: Path) -> None:
     """A failed audit is of a binary and a build: another one is not refused, and has an outcome of its own."""
     engine, case = find_engine(), make_case(run=SHORT)
-    failed = {"passed": False, "lines": 80, "failures": ["Hertz force"], "date": "2026-01-01T00:00:00Z"}
+    failed = {
+        "passed": False,
+        "lines": 80,
+        "failures": ["Hertz force"],
+        "date": "2026-01-01T00:00:00Z",
+    }
     write_audit(engine.sha256, {"contact_model": "0" * 64, **failed})
     assert _audit_of(run(case, own_cache / "runs")) is None
     record([Line("right", 1.0, 1.0, 0.1)], engine, "3.8.0")

@@ -42,11 +42,25 @@ CLIMB: dict[str, Any] = {
 CLIMBS = pd.DataFrame(
     [
         CLIMB
-        | {"onset": 6.0, "qualified": 7.0, "wall_names": "+x, +y", "leader": 1, "leader_large": False, "size": 4}
+        | {
+            "onset": 6.0,
+            "qualified": 7.0,
+            "wall_names": "+x, +y",
+            "leader": 1,
+            "leader_large": False,
+            "size": 4,
+        }
         | {"walls": 2},
         CLIMB | {"onset": 1.5, "qualified": 2.0, "wall_names": "+x", "leader": 0, "size": 2},
         CLIMB
-        | {"onset": 3.0, "qualified": 4.0, "wall_names": "-y", "leader": 0, "size": 3, "speed": 4e-3}
+        | {
+            "onset": 3.0,
+            "qualified": 4.0,
+            "wall_names": "-y",
+            "leader": 0,
+            "size": 3,
+            "speed": 4e-3,
+        }
         | {"out_of_pile": False},
     ]
 ).assign(pile=[0, 0, 1])
@@ -58,9 +72,13 @@ GARWOOD = {0: (0.0, 3.6889), 1: (0.0253, 5.5716), 2: (0.2422, 7.2247), 3: (0.618
 PILES = pd.DataFrame({"beads": BEADS, "large": LARGE, "driven": [LENGTH] * 4})
 
 
-def drawn(begins: Any, lengths: Any, takes: float, within: float | None = None, **columns: Any) -> dict[str, Any]:
+def drawn(
+    begins: Any, lengths: Any, takes: float, within: float | None = None, **columns: Any
+) -> dict[str, Any]:
     """`summary` of runs whose first climbs began so and take so long to gain enough, where the run shows that, s."""
-    rows = pd.DataFrame([CLIMB | {"size": 2, "leader": 0, "wall_names": "+x"}] * len(begins)).assign(**columns)
+    rows = pd.DataFrame(
+        [CLIMB | {"size": 2, "leader": 0, "wall_names": "+x"}] * len(begins)
+    ).assign(**columns)
     rows = rows.assign(pile=range(len(begins)), onset=begins, qualified=np.add(begins, takes))
     piles = pd.DataFrame({"beads": BEADS, "large": LARGE, "driven": lengths})
     return summary(piles, rows[rows["qualified"] <= lengths], within)
@@ -73,16 +91,24 @@ def test_a_rate_has_the_exact_interval_of_a_poisson_distribution() -> None:
     for where, climbs in {"all": 3, "plain walls": 2, "corners": 1}.items():
         row = rows.loc[where]
         assert (row["condition"], row["runs"], row["climbs"]) == ("few", 4, climbs)
-        assert (row["rate_low"] * 40.0, row["rate_high"] * 40.0) == pytest.approx(GARWOOD[climbs], abs=6e-5)
+        assert (row["rate_low"] * 40.0, row["rate_high"] * 40.0) == pytest.approx(
+            GARWOOD[climbs], abs=6e-5
+        )
     assert [*rows["probability"]] == [0.5, 0.5, 0.25]
     ends = (rows["probability_low"]["all"], rows["probability_high"]["all"])
     assert ends == pytest.approx((0.0676, 0.9324), abs=6e-5)
     for part, climbs in {"": 3, "on_plain_walls": 2, "in_corners": 1, "out_of_pile": 2}.items():
         one = found[part] if part else found
-        assert (one["climbs"], one["seconds"], one["rate"]) == (climbs, 40.0, pytest.approx(climbs / 40.0)), part
+        assert (one["climbs"], one["seconds"], one["rate"]) == (
+            climbs,
+            40.0,
+            pytest.approx(climbs / 40.0),
+        ), part
         low, high = np.array(one["rate_interval"]) * 40.0
         assert (low, high) == pytest.approx(GARWOOD[climbs], abs=6e-5), part
-        assert (poisson.sf(climbs - 1, low), poisson.cdf(climbs, high)) == pytest.approx((0.025, 0.025)), part
+        assert (poisson.sf(climbs - 1, low), poisson.cdf(climbs, high)) == pytest.approx(
+            (0.025, 0.025)
+        ), part
     none = summary(PILES[2:], CLIMBS[:0])
     assert (none["rate"], none["dispersion"]) == (0.0, None)
     assert np.array(none["rate_interval"]) * 20.0 == pytest.approx(GARWOOD[0], abs=6e-5)
@@ -90,7 +116,14 @@ def test_a_rate_has_the_exact_interval_of_a_poisson_distribution() -> None:
 
 def test_times_dispersion_and_probability_of_three_climbs_also_of_runs_cut() -> None:
     found = summary(PILES, CLIMBS)
-    expected = {"within": LENGTH, "times": [2.0, 4.0], "onsets": [1.5, 3.0], "median": 4.0, "censored": 2, "ended": 0}
+    expected = {
+        "within": LENGTH,
+        "times": [2.0, 4.0],
+        "onsets": [1.5, 3.0],
+        "median": 4.0,
+        "censored": 2,
+        "ended": 0,
+    }
     expected |= {"speeds": [2e-3, 2e-3, 4e-3], "sizes": [4, 2, 3], "led_by_large": 2}
     assert {name: found[name] for name in expected} == expected
     # Two of four, Clopper and Pearson: p with (1-p)⁴ + 4p(1-p)³ + 6p²(1-p)² = 0.025 at the upper end.
@@ -100,7 +133,13 @@ def test_times_dispersion_and_probability_of_three_climbs_also_of_runs_cut() -> 
     assert found["dispersion"] == pytest.approx(11.0 / 12.0 / 0.75)
     # Runs cut at 5 s: counts 1, 1, 0, 0, mean 1/2, variance (4 × 1/4)/3.
     cut = summary(PILES, CLIMBS, within=5.0)
-    assert (cut["within"], cut["seconds"], cut["climbs"], cut["climbed"], cut["rate"]) == (5.0, 20.0, 2, 2, 0.1)
+    assert (cut["within"], cut["seconds"], cut["climbs"], cut["climbed"], cut["rate"]) == (
+        5.0,
+        20.0,
+        2,
+        2,
+        0.1,
+    )
     assert cut["dispersion"] == pytest.approx(2.0 / 3.0)
     printed = texts_of({**found, "condition": ""})
     texts = {"climbed": "2 of 4", "half by (s)": "4", "led by large": "2 of 3", "beads": "2 to 4"}
@@ -111,7 +150,10 @@ def test_times_dispersion_and_probability_of_three_climbs_also_of_runs_cut() -> 
 
 def test_the_share_of_runs_of_all_lengths_is_kaplans_and_meiers() -> None:
     """Climbs after 1, 3 and 4 s, ends without one after 2, 5 and 6 s: 6, then 4, then 3 piles were at risk."""
-    first, watched = np.array([1.0, np.inf, 3.0, 4.0, np.inf, np.inf]), np.array([7.0, 2.0, 7.0, 7.0, 5.0, 6.0])
+    first, watched = (
+        np.array([1.0, np.inf, 3.0, 4.0, np.inf, np.inf]),
+        np.array([7.0, 2.0, 7.0, 7.0, 5.0, 6.0]),
+    )
     found = survival(first, watched, 4.5)
     stay = 5.0 / 6.0 * 3.0 / 4.0 * 2.0 / 3.0
     assert (found["climbed"], found["ended"], found["censored"], found["median"]) == (3, 1, 3, 4.0)
@@ -126,9 +168,14 @@ def test_runs_that_climbers_ended_tell_of_later_times() -> None:
     """Two piles have climbed, and their climbers left. A third has not by 2.5 s: nobody knows after that."""
     left = survival(np.array([1.0, 2.0]), np.array([3.0, 3.5]), 5.0)
     assert (left["probability"], left["interval"]) == (1.0, pytest.approx([0.025**0.5, 1.0]))
-    half = survival(np.array([1.0, np.inf]), np.array([1.5, 3.5]), 3.0)  # one of two, Clopper and Pearson
+    half = survival(
+        np.array([1.0, np.inf]), np.array([1.5, 3.5]), 3.0
+    )  # one of two, Clopper and Pearson
     assert half["interval"] == pytest.approx([1.0 - 0.975**0.5, 0.975**0.5])
-    assert survival(np.array([1.0, 2.0, np.inf]), np.array([3.0, 3.5, 2.5]), 5.0)["probability"] is None
+    assert (
+        survival(np.array([1.0, 2.0, np.inf]), np.array([3.0, 3.5, 2.5]), 5.0)["probability"]
+        is None
+    )
 
 
 def test_as_many_large_leaders_by_chance_are_enumerated() -> None:
@@ -172,7 +219,15 @@ def test_chances_are_printed_with_the_share_of_large_beads() -> None:
     rare = texts_of({**found, "condition": "", "p_among_beads": 1e-4})
     assert rare["p by chance"] == "0.0002"
     none = texts_of({**summary(PILES, CLIMBS[:0]), "condition": ""})
-    absent = ("p by chance", "dispersion", "half by (s)", "speed (mm/s)", "median speed (mm/s)", "height (mm)", "beads")
+    absent = (
+        "p by chance",
+        "dispersion",
+        "half by (s)",
+        "speed (mm/s)",
+        "median speed (mm/s)",
+        "height (mm)",
+        "beads",
+    )
     assert {name: none[name] for name in absent} == dict.fromkeys(absent, "–")
     assert (none["climbed"], none["led by large"]) == ("0 of 4", "0 of 0")
 
@@ -187,7 +242,10 @@ def test_speeds_of_two_climbs_are_told_by_their_range_and_median() -> None:
 
 @pytest.mark.parametrize(
     ("times", "within", "probability", "estimator"),
-    [([np.inf] * 4, 9.5, 0.0, "Clopper-Pearson"), ([1.0, 2.0, 3.0, 9.0], 9.5, 1.0, "Clopper-Pearson")],
+    [
+        ([np.inf] * 4, 9.5, 0.0, "Clopper-Pearson"),
+        ([1.0, 2.0, 3.0, 9.0], 9.5, 1.0, "Clopper-Pearson"),
+    ],
     ids=["none", "all"],
 )
 def test_where_none_or_all_have_climbed_the_interval_is_exact(
@@ -219,7 +277,9 @@ def test_runs_of_different_lengths_tell_one_probability() -> None:
     found = drawn(begins, driven, 0.0, within=3.0)
     expected = 1.0 - np.exp(-3.0 / 2.0)
     assert found["probability"] == pytest.approx(expected, abs=0.06)
-    assert found["climbed"] / found["runs"] < expected - 0.05  # as if those that had ended had not climbed
+    assert (
+        found["climbed"] / found["runs"] < expected - 0.05
+    )  # as if those that had ended had not climbed
     assert found["median"] == pytest.approx(2.0 * np.log(2.0), abs=0.2)
     assert found["censored"] == (begins > np.minimum(driven, 3.0)).sum()
     assert found["ended"] == (begins > driven)[driven < 3.0].sum()
@@ -232,7 +292,11 @@ def test_the_parts_of_climbs_are_judged_at_the_time_of_the_whole() -> None:
     Climbers that hung on a wall since the pouring can be left out.
     """
     hung = drawn([0.5, 1.0, 1.5, 2.0], np.full(4, 8.0), 1.0, out_of_pile=[False, True, False, True])
-    assert (hung["climbed"], hung["out_of_pile"]["climbed"], hung["out_of_pile"]["onsets"]) == (4, 2, [1.0, 2.0])
+    assert (hung["climbed"], hung["out_of_pile"]["climbed"], hung["out_of_pile"]["onsets"]) == (
+        4,
+        2,
+        [1.0, 2.0],
+    )
     assert hung["median"] == 2.0  # half have qualified then; half had begun a second before
     found = drawn([5.0, 1.0, 20.0], np.array([9.0, 7.0, 8.0]), 1.0, walls=[1, 2, 1])
     parts = [found, found["on_plain_walls"], found["in_corners"]]
@@ -275,7 +339,9 @@ def test_the_figure_has_the_rates_of_each_condition_beside_its_name() -> None:
         line, _, (bars,) = drawn[label]  # type: ignore[misc]
         assert list(line.get_xdata()) == pytest.approx([number / 40.0 for number in climbs])
         ends = [segment[:, 0].tolist() for segment in bars.get_segments()]
-        assert np.array(ends) * 40.0 == pytest.approx(np.array([GARWOOD[number] for number in climbs]), abs=6e-5)
+        assert np.array(ends) * 40.0 == pytest.approx(
+            np.array([GARWOOD[number] for number in climbs]), abs=6e-5
+        )
 
 
 def test_a_band_of_the_share_that_has_climbed_does_not_fall() -> None:
@@ -287,19 +353,30 @@ def test_a_band_of_the_share_that_has_climbed_does_not_fall() -> None:
         json.dumps(found, allow_nan=False)
         curve = pd.DataFrame(found).astype(float)
         inside = curve.dropna()
-        assert curve["probability"].is_monotonic_increasing and inside["high"].is_monotonic_increasing, seed
-        assert (inside[["low", "probability", "high"]].diff(axis=1).iloc[:, 1:] >= 0.0).all(axis=None)
+        assert (
+            curve["probability"].is_monotonic_increasing and inside["high"].is_monotonic_increasing
+        ), seed
+        assert (inside[["low", "probability", "high"]].diff(axis=1).iloc[:, 1:] >= 0.0).all(
+            axis=None
+        )
 
 
 def test_conditions_are_named_by_what_is_not_usual() -> None:
     """Of one key at a time, the seeds and lists of numbers among them; the last point is not finished."""
-    columns = {"run.seed": "", "mixture.large[0]": "mm", "mixture.large[1]": "mm", "drive.frequency": "Hz"}
+    columns = {
+        "run.seed": "",
+        "mixture.large[0]": "mm",
+        "mixture.large[1]": "mm",
+        "drive.frequency": "Hz",
+    }
     rows = [
         (seed, *values)
         for seed in (1, 2)
         for values in ((0.5, 0.6, 170.0), (0.4, 0.4, 170.0), (0.5, 0.6, 100.0), (0.5, 0.6, 250.0))
     ]
-    frame = pd.DataFrame(rows, columns=list(columns)).assign(run=list("01234567"), status=["finished"] * 7 + [""])
+    frame = pd.DataFrame(rows, columns=list(columns)).assign(
+        run=list("01234567"), status=["finished"] * 7 + [""]
+    )
     frame.attrs |= {"units": columns, "varied": list(columns), "sweep": ""}
     frame.attrs["axes"] = [("run.seed",), ("mixture.large", "drive.frequency")]
     assert {label: rows["run"].tolist() for label, rows in conditions_in(frame)} == {
@@ -312,15 +389,23 @@ def test_conditions_are_named_by_what_is_not_usual() -> None:
 
 def test_clusters_climb_from_the_friction_of_no_velocity_on() -> None:
     """Of two liquids in any order: 3/4 of the way from 0.2 to 0.3, and at a friction of the sweep itself."""
-    friction, speeds = [0.3, 0.1, 0.2, 0.4], {"water": [1e-3, -9e-3, -3e-3, 5e-3], "oil": [-4e-3, -6e-3, -5e-3, 0.0]}
+    friction, speeds = (
+        [0.3, 0.1, 0.2, 0.4],
+        {"water": [1e-3, -9e-3, -3e-3, 5e-3], "oil": [-4e-3, -6e-3, -5e-3, 0.0]},
+    )
     frames = [
-        pd.DataFrame({"contact.friction.bead_wall": friction, "axial_velocity": speed, "liquid.name": liquid})
+        pd.DataFrame(
+            {"contact.friction.bead_wall": friction, "axial_velocity": speed, "liquid.name": liquid}
+        )
         for liquid, speed in speeds.items()
     ]
     found = [list(row.values()) for row in tables.least_frictions(pd.concat(frames))]
     assert found == [["water", "0.28", "5"], ["oil", "0.40", "0"]]
     rough = pd.concat(frames).assign(**{"contact.roughness.bead_wall": 0.1})
-    assert [row["cluster"] for row in tables.least_frictions(rough)] == ["water, 0.1 um", "oil, 0.1 um"]
+    assert [row["cluster"] for row in tables.least_frictions(rough)] == [
+        "water, 0.1 um",
+        "oil, 0.1 um",
+    ]
 
 
 def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
@@ -336,23 +421,39 @@ def test_a_sweep_of_piles_has_a_table_and_chances(tmp_path: Path) -> None:
     assert frame["surface_end"].between(1e-3, 9e-3).all()
     printed = json.loads(call("climb", "starts", *out, "--json", check=True).stdout)
     (found,) = printed
-    assert (found["condition"], found["runs"], found["climbed"], found["each"]) == ("starts", 2, 0, [])
-    assert found["interval"] == pytest.approx([0.0, 1.0 - 0.025**0.5])  # none of two, Clopper and Pearson
+    assert (found["condition"], found["runs"], found["climbed"], found["each"]) == (
+        "starts",
+        2,
+        0,
+        [],
+    )
+    assert found["interval"] == pytest.approx(
+        [0.0, 1.0 - 0.025**0.5]
+    )  # none of two, Clopper and Pearson
     upper = 3.6889 / found["seconds"]  # of no event (Garwood 1936)
-    assert [found[part]["rate_interval"] for part in PARTS] == [pytest.approx([0.0, upper], rel=1e-4)] * 3
+    assert [found[part]["rate_interval"] for part in PARTS] == [
+        pytest.approx([0.0, upper], rel=1e-4)
+    ] * 3
     to = tmp_path / "climbs"
     run = str(starts.runs[0].directory)
     for form, within in ((".csv", "1s"), (".svg", "10ms")):
-        done = call("climb", "starts", run, *out, "--to", f"{to}{form}", "--within", within, check=True)
+        done = call(
+            "climb", "starts", run, *out, "--to", f"{to}{form}", "--within", within, check=True
+        )
         assert [done.stdout.count(f"0 of {number}\n") for number in (2, 1)] == [1, 1], done.stdout
         assert "warning" not in done.stderr  # such as one of a layout that failed
         lines = [line for line in done.stdout.splitlines() if line.startswith("guessed")]
         assert len(lines) == 2 and all("friction.bead_wall 0.25" in line for line in lines)
     written = pd.read_csv(f"{to}.csv")
-    assert written["condition"].drop_duplicates().to_list() == ["starts", starts.runs[0].directory.name]
+    assert written["condition"].drop_duplicates().to_list() == [
+        "starts",
+        starts.runs[0].directory.name,
+    ]
     assert written["rate_high"].to_list()[:3] == pytest.approx([upper] * 3, rel=1e-4)
     assert "share that has climbed" in Path(f"{to}.svg").read_text()
     (starts.runs[1].directory / "manifest.json").unlink()
     done = call("climb", "starts", *out, check=True)
-    assert "0 of 1\n" in done.stdout and "–" not in done.stdout  # no speeds and no other numbers of no climbs
+    assert (
+        "0 of 1\n" in done.stdout and "–" not in done.stdout
+    )  # no speeds and no other numbers of no climbs
     assert "walkers: warning: starts: 1 of 2 points are not finished and left out\n" in done.stderr

@@ -50,7 +50,10 @@ def bridges_of(pairs: list[tuple[int, int]], walls: dict[int, int]) -> Bridges:
 
 def rows_of(columns: Columns) -> list[Any]:
     """The rows of a table."""
-    return [SimpleNamespace(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)]
+    return [
+        SimpleNamespace(**dict(zip(columns, row, strict=True)))
+        for row in zip(*columns.values(), strict=True)
+    ]
 
 
 def seen(
@@ -70,7 +73,9 @@ def seen(
     height[:, 20 : 24 if rise.ndim == 2 and rise.shape[1] == 4 else 22] += rise
     held, bulks = [], []
     for frame in range(FRAMES):
-        bridges = bridges_of([*pairwise(BULK), *joined(frame), *pairs(frame)], {0: SIDE, 1: 0, **walls(frame)})
+        bridges = bridges_of(
+            [*pairwise(BULK), *joined(frame), *pairs(frame)], {0: SIDE, 1: 0, **walls(frame)}
+        )
         labels = connected(24, bridges.beads)
         floor = floor_of(names)
         bulks.append(bulk_of(labels, bridges, floor=floor))
@@ -78,8 +83,13 @@ def seen(
     beads = Beads(TIME, height, np.arange(24) == 20, np.zeros(FRAMES), bulks, 0, names)
     tracks = clusters.follow(TIME, held)
     table = climbs_of(tracks, beads)
-    events = [(one.event, one.track, one.other) for one in rows_of(clusters.events_of(tracks, table, beads))]
-    return SimpleNamespace(beads=beads, tracks=tracks, table=table, climbs=rows_of(table), events=events)
+    events = [
+        (one.event, one.track, one.other)
+        for one in rows_of(clusters.events_of(tracks, table, beads))
+    ]
+    return SimpleNamespace(
+        beads=beads, tracks=tracks, table=table, climbs=rows_of(table), events=events
+    )
 
 
 def test_a_rising_cluster_climbs() -> None:
@@ -93,8 +103,14 @@ def test_a_rising_cluster_climbs() -> None:
     assert len(track.frames) == FRAMES
     assert scene.events == []  # free and held from the begin to the end
     # It is above the surface as it is then: the bed sinks from 3 to 1 mm.
-    (climb,) = rows_of(climbs_of([track], replace(scene.beads, surface=np.linspace(3e-3, 1e-3, FRAMES))))
-    assert climb.above_surface == pytest.approx(climb.height - 1e-3) == pytest.approx(4e-3 + 3e-3 * TIME[-1])
+    (climb,) = rows_of(
+        climbs_of([track], replace(scene.beads, surface=np.linspace(3e-3, 1e-3, FRAMES)))
+    )
+    assert (
+        climb.above_surface
+        == pytest.approx(climb.height - 1e-3)
+        == pytest.approx(4e-3 + 3e-3 * TIME[-1])
+    )
 
 
 def test_the_error_of_a_speed_is_its_scatter() -> None:
@@ -130,9 +146,15 @@ NONE: dict[str, tuple[float | None, dict[str, Any]]] = {
             "walls": lambda frame: {20: SIDE} if frame in (0, 4) else {},
         },
     ),
-    "it is thrown into the air": (0.0, {"rise": (40e-3 * TIME - 10e-3 * TIME**2)[:, None], "walls": lambda frame: {}}),
+    "it is thrown into the air": (
+        0.0,
+        {"rise": (40e-3 * TIME - 10e-3 * TIME**2)[:, None], "walls": lambda frame: {}},
+    ),
     "it rises with the pile": (0.0, {"rise": UP, "pairs": lambda frame: [(21, 19)]}),
-    "it is a single bead": (0.0, {"rise": UP * [1.0, 0.0], "joined": lambda frame: [*ON_PILE, (21, 19)]}),
+    "it is a single bead": (
+        0.0,
+        {"rise": UP * [1.0, 0.0], "joined": lambda frame: [*ON_PILE, (21, 19)]},
+    ),
 }
 
 
@@ -146,15 +168,21 @@ def test_what_is_no_climb(why: str) -> None:
     assert gains is None or all(climb.gain < gains for climb in scene.climbs)
 
 
-@pytest.mark.parametrize(("seconds", "falls", "tracks"), [(0.06, 0.0, 1), (0.06, 1e-3, 1), (0.3, 0.0, 2)])
-def test_a_tail_that_brushes_the_pile_does_not_end_a_climb(seconds: float, falls: float, tracks: int) -> None:
+@pytest.mark.parametrize(
+    ("seconds", "falls", "tracks"), [(0.06, 0.0, 1), (0.06, 1e-3, 1), (0.3, 0.0, 2)]
+)
+def test_a_tail_that_brushes_the_pile_does_not_end_a_climb(
+    seconds: float, falls: float, tracks: int
+) -> None:
     up = UP - falls * (TIME[:, None] >= 2.01)
     scene = seen(up, lambda frame: [(21, 19)] if 2.0 <= TIME[frame] < 2.0 + seconds else [])
     assert len(scene.tracks) == tracks
     assert all(climb.climbed for climb in scene.climbs)
     if tracks == 1:  # what it rose while it was on the pile does not count, what it fell does
         rose = 3e-3 * (seconds + 0.02)
-        assert scene.climbs[0].gain == pytest.approx(3e-3 * TIME[-1] - rose + min(rose - falls, 0.0))
+        assert scene.climbs[0].gain == pytest.approx(
+            3e-3 * TIME[-1] - rose + min(rose - falls, 0.0)
+        )
 
 
 def test_two_that_meet_go_on_as_one_and_one_that_parts_is_followed_by_its_beads() -> None:
@@ -169,10 +197,15 @@ def test_two_that_meet_go_on_as_one_and_one_that_parts_is_followed_by_its_beads(
     assert len(ended.frames) == MIDDLE
     assert max(climb.size for climb in scene.climbs) == 4
     meets = False
-    scene = seen(four * [1.0, 1.0, 1 / 3, 1 / 3], walls=lambda frame: {20: SIDE, 23: SIDE + 1}, joined=joined)
+    scene = seen(
+        four * [1.0, 1.0, 1 / 3, 1 / 3], walls=lambda frame: {20: SIDE, 23: SIDE + 1}, joined=joined
+    )
     assert [len(track.frames) for track in scene.tracks] == [FRAMES, FRAMES - MIDDLE]
     assert scene.events == [("split", 1, 0)]
-    assert {track.members[-1] for track in scene.tracks} == {frozenset({20, 21}), frozenset({22, 23})}
+    assert {track.members[-1] for track in scene.tracks} == {
+        frozenset({20, 21}),
+        frozenset({22, 23}),
+    }
     assert {climb.wall_names for climb in scene.climbs} == {"-y", "+y"}
 
 
@@ -185,7 +218,9 @@ def test_two_that_meet_go_on_as_one_and_one_that_parts_is_followed_by_its_beads(
         (0, range(FRAMES - 3, FRAMES), range(0), []),  # which may still go on
     ],
 )
-def test_how_a_cluster_begins_and_ends(freed: int, let_go: range, fallen: range, events: list[str]) -> None:
+def test_how_a_cluster_begins_and_ends(
+    freed: int, let_go: range, fallen: range, events: list[str]
+) -> None:
     """On the pile in so many first frames, off the wall in some, on the pile again in some."""
     scene = seen(
         pairs=lambda frame: [(21, 19)] if frame < freed or frame in fallen else [],
@@ -198,8 +233,14 @@ def test_how_a_cluster_begins_and_ends(freed: int, let_go: range, fallen: range,
 def test_where_the_beads_of_a_climb_came_from() -> None:
     """Two on a wall; a third leaves the pile and joins them at 1 s; they climb from 2 s on."""
     pairs = [[(20, 21), (21, 22) if now >= 1.0 else (22, 19), (23, 19)] for now in TIME]
-    scene = seen(3e-3 * np.clip(TIME[:, None] - 2.0, 0.0, None) * [1.0, 1.0, 1.0, 0.0], joined=pairs.__getitem__)
-    bridges = [replace(bridges_of([*pairwise(BULK), *some], {20: SIDE}), frame=n) for n, some in enumerate(pairs)]
+    scene = seen(
+        3e-3 * np.clip(TIME[:, None] - 2.0, 0.0, None) * [1.0, 1.0, 1.0, 0.0],
+        joined=pairs.__getitem__,
+    )
+    bridges = [
+        replace(bridges_of([*pairwise(BULK), *some], {20: SIDE}), frame=n)
+        for n, some in enumerate(pairs)
+    ]
     rows = rows_of(assembly_of(scene.tracks, scene.table, scene.beads, bridges))
     assert max(row.time for row in rows) == scene.climbs[0].qualified > 2.0
     of_third = [row for row in rows if row.bead == 22]
@@ -214,14 +255,19 @@ def test_a_bead_on_the_first_wall_of_a_vessel_without_a_floor_is_at_a_wall() -> 
     names = ("60°", "-60°", "-y", "+y")
     pairs = [[(20, 21), *ON_PILE]] * FRAMES
     scene = seen(UP, walls=lambda frame: {20: 0}, names=names)
-    bridges = [replace(bridges_of([*pairwise(BULK), *some], {20: 0}), frame=n) for n, some in enumerate(pairs)]
+    bridges = [
+        replace(bridges_of([*pairwise(BULK), *some], {20: 0}), frame=n)
+        for n, some in enumerate(pairs)
+    ]
     rows = rows_of(assembly_of(scene.tracks, scene.table, scene.beads, bridges))
     assert {row.bead for row in rows if row.at_wall} == {20}
 
 
 def test_what_comes_later_does_not_change_when_a_climb_qualified() -> None:
     """Up 2.4 mm, down by more, up twice as far, a hop: records of any length tell the same of the time they share."""
-    up = np.interp(TIME, [0.0, 0.8, 1.6, 3.2, 3.5, 3.52], [0.0, 2.4e-3, -0.5e-3, 4.8e-3, 0.0, 6e-3])[:, None]
+    up = np.interp(
+        TIME, [0.0, 0.8, 1.6, 3.2, 3.5, 3.52], [0.0, 2.4e-3, -0.5e-3, 4.8e-3, 0.0, 6e-3]
+    )[:, None]
     scene = seen(up)
     (track,), (whole,) = scene.tracks, scene.climbs
     assert whole.qualified == pytest.approx(2.0 / 3.0, abs=0.02)
@@ -261,7 +307,11 @@ def _jitter(seed: int) -> npt.NDArray[np.float64]:
         (3e-3 * np.clip(TIME - 2.0, 0.0, None), 2.0, TIME[-1]),
         (3e-3 * np.clip(TIME, None, 2.0), 0.0, 2.0),
         (3e-3 * np.clip(TIME - 1.0, 0.0, 1.5), 1.0, 2.5),
-        (1e-3 * np.clip(1.0 - TIME, 0.0, None) + 3e-3 * np.clip(TIME - 2.0, 0.0, None), 2.0, TIME[-1]),
+        (
+            1e-3 * np.clip(1.0 - TIME, 0.0, None) + 3e-3 * np.clip(TIME - 2.0, 0.0, None),
+            2.0,
+            TIME[-1],
+        ),
     ],
     ids=["hangs, rises", "rises, hangs", "hangs, rises, hangs", "sinks, hangs, rises"],
 )
@@ -312,9 +362,22 @@ def test_a_rise_of_2_mm_is_a_climb(rise: float, climbed: bool) -> None:
         ("pile-trough", {}, [1, 3], "in_corners"),
         ("pile-ci", {}, [1], "on_plain_walls"),
         ("pile-ci", {}, [1, 3], "in_corners"),
-        ("pile-ci", {"boundary.shape": "cylinder", "boundary.width": "6 mm"}, [1], "on_plain_walls"),
+        (
+            "pile-ci",
+            {"boundary.shape": "cylinder", "boundary.width": "6 mm"},
+            [1],
+            "on_plain_walls",
+        ),
     ],
-    ids=["the first face", "a face", "a face normal to an axis", "two faces", "a side", "a corner", "a cylinder"],
+    ids=[
+        "the first face",
+        "a face",
+        "a face normal to an axis",
+        "two faces",
+        "a side",
+        "a corner",
+        "a cylinder",
+    ],
 )
 def test_a_climb_is_in_a_corner_if_two_walls_hold_it(
     case: str, changes: dict[str, Any], walls: list[int], where: str
@@ -359,12 +422,21 @@ def test_the_bulk_and_its_segregation() -> None:
 @pytest.mark.parametrize(
     ("turn", "walls"),
     [(15.0, 1), (44.0, 1), (46.0, 2), (90.0, 2), (180.0, 2)],
-    ids=["faces of a round vessel", "below 45°", "above 45°", "corner of a box", "two walls of a slot"],
+    ids=[
+        "faces of a round vessel",
+        "below 45°",
+        "above 45°",
+        "corner of a box",
+        "two walls of a slot",
+    ],
 )
 def test_walls_that_turn_little_are_no_corner(turn: float, walls: int) -> None:
     """A cluster in the middle of two planes whose normals are at an angle."""
     angle = np.radians(turn)
-    planes = [Flat((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), Flat((0.0, 0.0, 0.0), (np.cos(angle), np.sin(angle), 0.0))]
+    planes = [
+        Flat((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        Flat((0.0, 0.0, 0.0), (np.cos(angle), np.sin(angle), 0.0)),
+    ]
     beads = Beads(
         TIME,
         np.zeros((FRAMES, 24)),

@@ -58,7 +58,9 @@ from walkers.text import environment
 
 @pytest.fixture
 def short_case(in_folder: Path) -> Path:
-    (in_folder / "sweep.toml").write_text('case = "short.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n')
+    (in_folder / "sweep.toml").write_text(
+        'case = "short.toml"\n[axes]\ndimers.angle = ["0 deg", "10 deg"]\n'
+    )
     file = in_folder / "short.toml"
     file.write_text(to_toml({"title": "price: 5$ and 3$", **document(run=SHORT)}))
     return file
@@ -69,7 +71,9 @@ def parts(in_folder: Path, once: Callable[[str, Callable[[Path], object]], Path]
     """A copy of a run of three segments, to be damaged."""
 
     def make(folder: Path) -> None:
-        (folder / "short.toml").write_text(to_toml(document(run={**SHORT, "time_step": "2 us", "segment": "25 ms"})))
+        (folder / "short.toml").write_text(
+            to_toml(document(run={**SHORT, "time_step": "2 us", "segment": "25 ms"}))
+        )
         call("run", "short.toml", check=True, folder=folder)
 
     shutil.copytree(once("short-run", make), in_folder, dirs_exist_ok=True)
@@ -90,7 +94,9 @@ def edited(name: str, change: Callable[[dict[str, Any]], object]) -> Damage:
 
 
 def cut(name: str, size: int) -> Damage:
-    return lambda run: os.truncate(run / name, size if size > 0 else (run / name).stat().st_size + size)
+    return lambda run: os.truncate(
+        run / name, size if size > 0 else (run / name).stat().st_size + size
+    )
 
 
 def written_over(name: str, end: bytes) -> Damage:
@@ -124,19 +130,31 @@ READERS = {
 SECOND = "segments/0001"
 DAMAGES: dict[str, tuple[Damage, str, str]] = {
     # What is done to a run, who reads that, what is said.
-    "an edited case": (edited("case.json", lambda case: case["drive"].update(frequency=81.0)), "case", "has changed"),
+    "an edited case": (
+        edited("case.json", lambda case: case["drive"].update(frequency=81.0)),
+        "case",
+        "has changed",
+    ),
     "no case": (lambda run: (run / "case.json").unlink(), "case", "case.json"),
     "a manifest that was cut": (cut("manifest.json", 100), "case", "manifest.json"),
     "a result that was cut": (cut("result.json", 100), "result", "its result.json cannot be read"),
     "a table that was cut": (cut("trajectory.parquet", 100), "tables", "trajectory.parquet"),
     "a layout that was cut": (cut(f"{SECOND}/layout.json", 100), "beads", "layout.json"),
     "a missing segment": (lambda run: shutil.rmtree(run / SECOND), "beads", "segment|0001"),
-    "a dump that was cut": (cut(f"{SECOND}/beads.bin", 1000), "beads", "beads.bin|dump is incomplete"),
+    "a dump that was cut": (
+        cut(f"{SECOND}/beads.bin", 1000),
+        "beads",
+        "beads.bin|dump is incomplete",
+    ),
     "no number in a dump": (
         written_over(f"{SECOND}/beads.bin", struct.pack("=d", np.nan)),
         *("beads", "is not a number at step .*: the dump was damaged after|has changed"),
     ),
-    "a text that was cut": (cut(f"{SECOND}/bridges.walls.txt", -200), "bridges", "bridges.walls.txt"),
+    "a text that was cut": (
+        cut(f"{SECOND}/bridges.walls.txt", -200),
+        "bridges",
+        "bridges.walls.txt",
+    ),
     "a dump to be measured": (
         unmeasured(written_over(f"{SECOND}/beads.bin", b"\xff" * 64)),
         *("case result", "beads.bin has changed|has no result.json"),
@@ -145,10 +163,16 @@ DAMAGES: dict[str, tuple[Damage, str, str]] = {
 
 
 @pytest.mark.parametrize("name", DAMAGES)
-def test_a_damaged_run_is_told_in_a_line_by_all_that_read_what_is_damaged(name: str, parts: Path) -> None:
+def test_a_damaged_run_is_told_in_a_line_by_all_that_read_what_is_damaged(
+    name: str, parts: Path
+) -> None:
     (damage, what, told), run = DAMAGES[name], parts
     damage(run)
-    files = {path: path.read_bytes() for path in run.rglob("*") if path.is_file() and path.suffix != ".lock"}
+    files = {
+        path: path.read_bytes()
+        for path in run.rglob("*")
+        if path.is_file() and path.suffix != ".lock"
+    }
     for command, reads in READERS.items():
         damaged = {*what.split()} & {*reads.split()}
         if not damaged and (reads or what not in ("case", "result")):
@@ -158,7 +182,9 @@ def test_a_damaged_run_is_told_in_a_line_by_all_that_read_what_is_damaged(name: 
         assert "Traceback" not in done.stderr, (command, done.stderr)
         assert (done.returncode in (1, 2)) == (len(lines) == 1) == bool(damaged), (command, done)
         assert not lines or (str(run) in lines[0] and re.search(told, lines[0])), (command, lines)
-        assert all(path.read_bytes() == contents for path, contents in files.items()), "nothing on disk is lost"
+        assert all(path.read_bytes() == contents for path, contents in files.items()), (
+            "nothing on disk is lost"
+        )
     if what in ("result", "tables"):
         call("run", str(run), check=True)
         call("export", "--to", "archive", str(run), "-o", "out.zip", check=True)
@@ -174,7 +200,11 @@ def test_a_sweep_goes_on_without_a_damaged_run_and_says_which(name: str, short_c
     whole = name != "a dump to be measured"  # the table is of results alone
     status = ["finished" if whole else "failed", "finished"]
     table = load_table("runs/sweep")
-    assert (list(table["status"]), list(table["run"]), walkers.load("runs/sweep").status) == (status, runs, status[0])
+    assert (list(table["status"]), list(table["run"]), walkers.load("runs/sweep").status) == (
+        status,
+        runs,
+        status[0],
+    )
     told = {}
     for command in ("list runs/sweep", "plot runs/sweep", "list --all", "sweep sweep.toml"):
         done = call(*command.split())
@@ -208,12 +238,17 @@ def test_a_run_is_measured_by_one_process_at_a_time(parts: Path) -> None:
 def test_a_dump_of_beads_is_read_but_for_a_last_frame_that_was_cut(
     run_directory: Callable[..., Path], tmp_path: Path
 ) -> None:
-    beads, short = run_directory(dimers={"replicates": 2}, run=SHORT) / FIRST_SEGMENT / "beads.bin", tmp_path / "short"
+    beads, short = (
+        run_directory(dimers={"replicates": 2}, run=SHORT) / FIRST_SEGMENT / "beads.bin",
+        tmp_path / "short",
+    )
     columns = (*BEAD_COLUMNS, *MEAN_SPIN_COLUMNS)
     dump, contents = BinaryDump(beads, columns), beads.read_bytes()
     frames = dump.stack()
     assert frames.shape == (61, 4, len(columns))
-    np.testing.assert_allclose(frames[0, :, dump.columns.index("radius")], [3e-4, 2e-4, 3e-4, 2e-4], rtol=1e-15)
+    np.testing.assert_allclose(
+        frames[0, :, dump.columns.index("radius")], [3e-4, 2e-4, 3e-4, 2e-4], rtol=1e-15
+    )
     for less in (1, 200, 550):  # of a frame of 704 bytes, 104 of them its head
         short.write_bytes(contents[:-less])
         assert BinaryDump(short, columns).truncated
@@ -221,14 +256,22 @@ def test_a_dump_of_beads_is_read_but_for_a_last_frame_that_was_cut(
     short.write_bytes(contents[:-8] + struct.pack("=d", np.inf))
     with pytest.raises(DumpError, match="is not a number at step"):
         BinaryDump(short, columns).stack()
-    for nonsense in (b"no dump at all, but text that is long enough for a header" * 5, b"\xff" * 500):
+    for nonsense in (
+        b"no dump at all, but text that is long enough for a header" * 5,
+        b"\xff" * 500,
+    ):
         short.write_bytes(nonsense)
-        for read_it in (lambda: BinaryDump(short, BEAD_COLUMNS), lambda: list(local_frames(short, ("x",)))):
+        for read_it in (
+            lambda: BinaryDump(short, BEAD_COLUMNS),
+            lambda: list(local_frames(short, ("x",))),
+        ):
             with pytest.raises(DumpError, match="short"):
                 read_it()
 
 
-def test_motion_takes_little_more_memory_than_its_arrays(run_directory: Callable[..., Path]) -> None:
+def test_motion_takes_little_more_memory_than_its_arrays(
+    run_directory: Callable[..., Path],
+) -> None:
     """Position, velocity and two spins are 96 bytes a bead and frame; copies would take as much again."""
     directory = run_directory(dimers={"replicates": 40}, run={**SHORT, "samples_per_cycle": 20})
     read_motion(directory)  # what is imported and kept takes memory once
@@ -241,7 +284,9 @@ def test_motion_takes_little_more_memory_than_its_arrays(run_directory: Callable
     assert 96.0 <= peak / (frames * beads) < 130.0
 
 
-def test_a_local_dump_is_read_whole_or_not_at_all(run_directory: Callable[..., Path], tmp_path: Path) -> None:
+def test_a_local_dump_is_read_whole_or_not_at_all(
+    run_directory: Callable[..., Path], tmp_path: Path
+) -> None:
     segment = run_directory(dimers={"replicates": 2}, run=SHORT) / FIRST_SEGMENT
     path = Path(shutil.copy(segment / "bridges.pairs.txt", tmp_path))
     columns = tuple(json.loads((segment / "layout.json").read_text())["pair_bridge_columns"])
@@ -249,7 +294,9 @@ def test_a_local_dump_is_read_whole_or_not_at_all(run_directory: Callable[..., P
     whole = path.read_bytes()
     lines, last = whole.split(b"\n"), whole.rindex(b"ITEM: TIMESTEP")
     words = lines[9].split()
-    harmed = [whole[:end] for end in (*range(last + 1, len(whole), 7), len(whole) - 1)]  # in its header, its rows
+    harmed = [
+        whole[:end] for end in (*range(last + 1, len(whole), 7), len(whole) - 1)
+    ]  # in its header, its rows
     rows = (b" ".join([word, *words[1:]]) for word in (b"nan", b"inf", b"x", b"1 2", b""))
     harmed += [b"\n".join([*lines[:9], row, *lines[10:]]) for row in rows]
     for contents in harmed:
@@ -326,7 +373,10 @@ def test_only_regular_files_are_opened(kind: str, in_folder: Path) -> None:
         place.symlink_to("/dev/zero")
     else:
         place.mkdir()
-    with _at_most(60), pytest.raises(OSError, match=r"(not a regular file|Is a directory): .*file\.json"):
+    with (
+        _at_most(60),
+        pytest.raises(OSError, match=r"(not a regular file|Is a directory): .*file\.json"),
+    ):
         read_json(place)
 
 
@@ -350,7 +400,9 @@ def _built(source: str, folder: Path) -> str:
 def test_a_file_system_without_locks_is_named_with_advice(short_case: Path, tmp_path: Path) -> None:
     shim = _built(NO_LOCKS, tmp_path)
     command = [PROGRAM, "run", "short.toml"]
-    done = subprocess.run(command, env={**os.environ, "LD_PRELOAD": shim}, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, env={**os.environ, "LD_PRELOAD": shim}, capture_output=True, text=True, check=False
+    )
     lines = done.stderr.splitlines()
     told = [line for line in lines if "ERROR: ld.so" not in line and "never audited" not in line]
     assert (done.returncode, len(told)) == (2, 1), done
@@ -358,16 +410,24 @@ def test_a_file_system_without_locks_is_named_with_advice(short_case: Path, tmp_
 
 
 @pytest.mark.parametrize("kilobytes", [20, 600])
-def test_a_limit_of_the_size_of_files_is_named_with_advice(kilobytes: int, short_case: Path) -> None:
+def test_a_limit_of_the_size_of_files_is_named_with_advice(
+    kilobytes: int, short_case: Path
+) -> None:
     """The first limit stops the deck, the second one the engine."""
     many = "run.samples_per_cycle=250"
-    script = f"ulimit -f {kilobytes}; exec {PROGRAM} run short.toml --set {many} --set run.cycles=40"
+    script = (
+        f"ulimit -f {kilobytes}; exec {PROGRAM} run short.toml --set {many} --set run.cycles=40"
+    )
     # Python does not notice that byte code which it writes was cut.
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run(["bash", "-c", script], env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        ["bash", "-c", script], env=environment, capture_output=True, text=True, check=False
+    )
     last = done.stderr.splitlines()[-1]
     assert (done.returncode, "Traceback" in done.stderr) == (1, False), done
-    assert re.search(rf"limit of {kilobytes * 1.024:g} kB \(ulimit -f\): .*\(see runs/short-", last), last
+    assert re.search(
+        rf"limit of {kilobytes * 1.024:g} kB \(ulimit -f\): .*\(see runs/short-", last
+    ), last
 
 
 def test_a_folder_that_cannot_be_made_is_named(short_case: Path) -> None:
@@ -390,7 +450,9 @@ FULL = {
 """Commands that write to a disk, and their exit status if it is full."""
 
 
-def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(short_case: Path, tmp_path: Path) -> None:
+def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(
+    short_case: Path, tmp_path: Path
+) -> None:
     call("sweep", "sweep.toml", check=True)
     (run, _) = Path("runs").glob("short-*")
     with mounted(tmp_path / "disk", "256k") as disk:
@@ -398,11 +460,18 @@ def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(short_case
         for command, status in FULL.items():
             done = call(*command.format(disk, run=run).split())
             lines = [line for line in done.stderr.splitlines() if "never audited" not in line]
-            assert (done.returncode, len(lines), str(disk) in done.stderr) == (status, 1, True), (command, done)
+            assert (done.returncode, len(lines), str(disk) in done.stderr) == (status, 1, True), (
+                command,
+                done,
+            )
             assert "No space left on device" in lines[0] or "disk full" in lines[0]
         assert not (disk / "deck").exists()
-        assert [path for path in disk.rglob("*") if path.is_file() and path.stat().st_size] == [ballast]
-        assert not [path for path in disk.rglob("*") if ".new" in path.name or path.suffix == ".lock"]
+        assert [path for path in disk.rglob("*") if path.is_file() and path.stat().st_size] == [
+            ballast
+        ]
+        assert not [
+            path for path in disk.rglob("*") if ".new" in path.name or path.suffix == ".lock"
+        ]
 
 
 def test_a_case_file_that_cannot_be_written_is_not_left_behind(tmp_path: Path) -> None:
@@ -415,7 +484,9 @@ def test_a_case_file_that_cannot_be_written_is_not_left_behind(tmp_path: Path) -
         call("new", str(disk / "x"), check=True)
 
 
-def test_mpirun_needs_room_for_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mpirun_needs_room_for_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Without it its processes would wait for each other without end; one process needs nothing there."""
     with mounted(tmp_path / "tmp", "2m") as place:
         monkeypatch.setenv("TMPDIR", str(place))
@@ -424,7 +495,9 @@ def test_mpirun_needs_room_for_temporary_files(tmp_path: Path, monkeypatch: pyte
             run_case(brief_pile(ranks=2), tmp_path / "runs", time_limit=PATIENCE)
 
 
-def test_a_run_goes_on_when_a_full_disk_has_room_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_goes_on_when_a_full_disk_has_room_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The disk is filled when the second segment begins: nothing is lost, and the numbers are those of another disk."""
     case = brief_pile(duration="0.06 s", segment="0.03 s")
     with mounted(tmp_path / "disk", "16m") as place:
@@ -467,11 +540,15 @@ def test_a_closed_output_is_no_error(short_case: Path) -> None:
     ("variable", "value", "command"),
     [("PYTHONIOENCODING", "ascii", "show fig1b"), ("MPLBACKEND", "nonsense", "plot short.toml")],
 )
-def test_an_odd_environment_does_not_matter(variable: str, value: str, command: str, short_case: Path) -> None:
+def test_an_odd_environment_does_not_matter(
+    variable: str, value: str, command: str, short_case: Path
+) -> None:
     """An encoding without the letters of units, and a backend that matplotlib does not have."""
     call("run", "short.toml", check=True)
     environment = {**os.environ, variable: value}
-    done = subprocess.run([PROGRAM, *command.split()], env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [PROGRAM, *command.split()], env=environment, capture_output=True, text=True, check=False
+    )
     assert (done.returncode, "Traceback" in done.stderr) == (0, False), done.stderr
     assert r"m/s\xb2" in done.stdout or "walk.png" in done.stdout
 
@@ -517,7 +594,9 @@ def stranger(run_directory: Callable[..., Path], tmp_path: Path) -> Stranger:
     given = run_directory(run=SHORT)
 
     def made(text: str) -> Path:
-        place = Path(shutil.copytree(given, tmp_path / f"{len([*tmp_path.iterdir()])}" / given.name))
+        place = Path(
+            shutil.copytree(given, tmp_path / f"{len([*tmp_path.iterdir()])}" / given.name)
+        )
         with recomputed(place, [CASE_NAME]):
             write_json(place / CASE_NAME, _with_texts(case_of(given), text).as_dict())
         return place
@@ -556,12 +635,17 @@ def _archive(text: str, stranger: Stranger, folder: Path) -> object:
     with zipfile.ZipFile(write_archive(run, folder / "archive.zip")) as archive:
         json.loads(archive.read("archive.json"))
         archive.extractall(folder / "unpacked")
-        names = [name.replace(Path(name).name, "") if name.endswith(".toml") else name for name in archive.namelist()]
+        names = [
+            name.replace(Path(name).name, "") if name.endswith(".toml") else name
+            for name in archive.namelist()
+        ]
     call("check", "files", str(folder / "unpacked"), check=True)
     return names
 
 
-@pytest.mark.parametrize("where", [_deck, _paraview, _page, _markdown, _archive], ids=lambda one: one.__name__[1:])
+@pytest.mark.parametrize(
+    "where", [_deck, _paraview, _page, _markdown, _archive], ids=lambda one: one.__name__[1:]
+)
 def test_a_text_changes_nothing_but_itself(
     where: Callable[[str, Stranger, Path], object], stranger: Stranger, tmp_path: Path
 ) -> None:
@@ -572,11 +656,16 @@ def test_a_text_changes_nothing_but_itself(
     assert [name for name in HOSTILE if told[name] != told["plain"]] == []
 
 
-ODD = '--sp ace; it\'s "so" $(touch executed)`touch executed`;touch executed;&& ${HOME}\\ [a]*?äγ走\ntwo' + "x" * 120
+ODD = (
+    '--sp ace; it\'s "so" $(touch executed)`touch executed`;touch executed;&& ${HOME}\\ [a]*?äγ走\ntwo'
+    + "x" * 120
+)
 NO_UTF8 = os.fsdecode(b"x\xff")
 
 
-def test_odd_paths_are_paths_without_a_site_file_and_are_refused_with_one(short_case: Path, in_folder: Path) -> None:
+def test_odd_paths_are_paths_without_a_site_file_and_are_refused_with_one(
+    short_case: Path, in_folder: Path
+) -> None:
     """Before anything is done; also names that are no UTF-8, which the libraries of the tables do not take."""
     (in_folder / "site.toml").write_text("cores = 2\n")
     (sweep := in_folder / f"{ODD}.toml").write_text((in_folder / "sweep.toml").read_text())
@@ -599,5 +688,8 @@ def test_odd_paths_are_paths_without_a_site_file_and_are_refused_with_one(short_
     assert list(load_table(in_folder / ODD / ODD)["status"]) == ["finished"] * 2
     short_case.rename(sweep)
     for command in (("run",), ("plot",), ("export", "--to", "vtk")):
-        assert "Traceback" not in call(*command, f"./{ODD}.toml", "--out", f"./{ODD}", check=True).stderr
+        assert (
+            "Traceback"
+            not in call(*command, f"./{ODD}.toml", "--out", f"./{ODD}", check=True).stderr
+        )
     assert not list(in_folder.rglob("executed"))

@@ -18,7 +18,15 @@ from matplotlib.figure import Figure
 
 import walkers
 from docs._ext import generated
-from docs.illustrations import facts, mark_upright, output_of, pages_of, refreshed, stale, without_hashes
+from docs.illustrations import (
+    facts,
+    mark_upright,
+    output_of,
+    pages_of,
+    refreshed,
+    stale,
+    without_hashes,
+)
 from walkers import load_case
 from walkers.files import read_json
 from walkers.text import rendered
@@ -42,7 +50,10 @@ def prose(page: Path) -> str:
 @cache
 def anchors(page: Path) -> set[str]:
     """As GitHub and myst make them of headings: lower case, hyphens for blanks, no punctuation."""
-    titles = (re.sub(r"[`*]|\[([^\]]*)\]\([^)]*\)", r"\1", title) for title in _HEADING.findall(prose(page)))
+    titles = (
+        re.sub(r"[`*]|\[([^\]]*)\]\([^)]*\)", r"\1", title)
+        for title in _HEADING.findall(prose(page))
+    )
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
@@ -52,7 +63,9 @@ def test_links_of_a_page_lead_somewhere(page: Path) -> None:
     for link in (groups[0] or groups[1] for groups in _LINK.findall(_CODE.sub("", prose(page)))):
         name, _, anchor = link.partition("#")
         target = (page.parent / name).resolve() if name else page
-        known = re.match(r"[a-z]+:", link) or (target.exists() and (not anchor or anchor in anchors(target)))
+        known = re.match(r"[a-z]+:", link) or (
+            target.exists() and (not anchor or anchor in anchors(target))
+        )
         missing += [] if known else [link]
     assert not missing
 
@@ -85,9 +98,13 @@ def test_names_in_docstrings_are_there() -> None:
         module = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
         homes = ("", f"{module}.", f"{module.rpartition('.')[0]}.", "builtins.", *_ERRORS)
         nodes = [*ast.walk(ast.parse(file.read_text("utf-8")))]
-        code = {getattr(node, field, None) for node in nodes for field in ("id", "attr", "arg", "name")}
+        code = {
+            getattr(node, field, None) for node in nodes for field in ("id", "attr", "arg", "name")
+        }
         texts = [
-            node.value.value for node in nodes if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+            node.value.value
+            for node in nodes
+            if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
         ]
         for name in (name for text in texts for name in _NAME.findall(str(text))):
             count += 1
@@ -99,14 +116,26 @@ def test_names_in_docstrings_are_there() -> None:
 
 def test_names_of_the_package_on_pages_and_in_templates_are_there() -> None:
     places = {
-        ROOT: ("README.md", "CONTRIBUTING.md", "walkers/**/*.j2", "studies/**/*.j2", "studies/*.md"),
+        ROOT: (
+            "README.md",
+            "CONTRIBUTING.md",
+            "walkers/**/*.j2",
+            "studies/**/*.j2",
+            "studies/*.md",
+        ),
         DOCS: ("**/*.md", "**/*.rst"),
     }
-    files = [file for folder, kinds in places.items() for kind in kinds for file in folder.glob(kind)]
-    found = {(file, name) for file in files for name in _OF_PACKAGE.findall(file.read_text("utf-8"))}
+    files = [
+        file for folder, kinds in places.items() for kind in kinds for file in folder.glob(kind)
+    ]
+    found = {
+        (file, name) for file in files for name in _OF_PACKAGE.findall(file.read_text("utf-8"))
+    }
     named = {(file, name) for file, name in found if name.split(".")[1] not in _FILES}
     assert len(named) > 10
-    assert not sorted(f"{file.relative_to(ROOT)}: {name}" for file, name in named if not is_there(name))
+    assert not sorted(
+        f"{file.relative_to(ROOT)}: {name}" for file, name in named if not is_there(name)
+    )
 
 
 def test_no_picture_or_table_is_of_other_parameters_than_todays() -> None:
@@ -124,21 +153,33 @@ def test_numbers_and_outputs_on_pages_are_todays(
 ) -> None:
     def printed(command: str) -> str:
         def print_it(folder: Path) -> None:
-            (folder / "printed.txt").write_text(output_of(command, folder / "runs"), encoding="utf-8")
+            (folder / "printed.txt").write_text(
+                output_of(command, folder / "runs"), encoding="utf-8"
+            )
 
         # Several pages show the same command.
-        return (once(f"output-{sha256(command.encode()).hexdigest()[:12]}", print_it) / "printed.txt").read_text()
+        return (
+            once(f"output-{sha256(command.encode()).hexdigest()[:12]}", print_it) / "printed.txt"
+        ).read_text()
 
     text = page.read_text("utf-8")
     assert without_hashes(refreshed(text, facts(DOCS), printed)) == without_hashes(text)
 
 
-@pytest.mark.parametrize("module", ["walkers.api", "walkers.inputs.reading", "walkers.postprocess.measure.motion"])
-def test_examples_give_what_they_say(module: str, runs_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "module", ["walkers.api", "walkers.inputs.reading", "walkers.postprocess.measure.motion"]
+)
+def test_examples_give_what_they_say(
+    module: str, runs_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """In a folder of the tests (``tmp``), with what a user would have imported."""
-    if module == "walkers.api":  # its sweep is there for its table: Fig. 4b would take all of 60 cycles
+    if (
+        module == "walkers.api"
+    ):  # its sweep is there for its table: Fig. 4b would take all of 60 cycles
         monkeypatch.setattr("walkers.inputs.resolving.length._MOST_CYCLES", 12)
-    failed, tried = doctest.testmod(import_module(module), extraglobs={"tmp": runs_folder, "walkers": walkers})
+    failed, tried = doctest.testmod(
+        import_module(module), extraglobs={"tmp": runs_folder, "walkers": walkers}
+    )
     assert tried
     assert not failed
 
@@ -160,7 +201,9 @@ def test_the_table_of_performance_is_the_benchmarks() -> None:
     """`make bench` keeps the ratios."""
     page = (DOCS / "explanation" / "performance.md").read_text("utf-8")
     told = [float(number) for number in re.findall(r"beads \| ([\d.]+) \|", page)]
-    ratios = [deck["minimal"] for deck in read_json(ROOT / "tests" / "benchmark_ratios.json").values()]
+    ratios = [
+        deck["minimal"] for deck in read_json(ROOT / "tests" / "benchmark_ratios.json").values()
+    ]
     assert told == pytest.approx(ratios, abs=0.06)
 
 
@@ -186,12 +229,20 @@ def test_symbols_of_clusters_are_filled_by_how_many_stay_upright() -> None:
     assert [list(line.get_ydata()) for line in shown.values()] == [[3.0], [4.0], [5.0]]
 
 
-@pytest.mark.parametrize("path", sorted((DOCS / "examples").glob("*.py")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted((DOCS / "examples").glob("*.py")), ids=lambda path: path.stem
+)
 def test_examples_of_the_gallery_use_public_names_alone(path: Path) -> None:
     """Laws of bridges, in texts that an example writes, are not looked at; the site's build runs each example."""
     tree = ast.parse(path.read_text("utf-8"))
     imported = [one.module for one in ast.walk(tree) if isinstance(one, ast.ImportFrom)]
-    imported += [name.name for one in ast.walk(tree) if isinstance(one, ast.Import) for name in one.names]
+    imported += [
+        name.name for one in ast.walk(tree) if isinstance(one, ast.Import) for name in one.names
+    ]
     assert {name for name in imported if name and name.split(".")[0] == "walkers"} == {"walkers"}
-    used = [one for one in ast.walk(tree) if isinstance(one, ast.Attribute) and isinstance(one.value, ast.Name)]
+    used = [
+        one
+        for one in ast.walk(tree)
+        if isinstance(one, ast.Attribute) and isinstance(one.value, ast.Name)
+    ]
     assert {one.attr for one in used if one.value.id == "walkers"} <= set(walkers.__all__)

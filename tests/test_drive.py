@@ -59,8 +59,19 @@ def test_a_sine_as_a_record_is_the_sine(frame: str, ramp: list[Any], tmp_path: P
     drive = {"frame": frame, **({"ramp": ramp} if ramp else {})}
     expected = run(make_case(run=BRIEF, drive=drive), tmp_path).result
     found = run(recorded(tmp_path, sine(z=1.0), repeats=True, **drive), tmp_path).result
-    names = ("velocity", "work", "rotation_1", "frequency", "peak_acceleration", "amplitude", "peak_velocity", "gamma0")
-    assert [found[name] for name in names] == pytest.approx([expected[name] for name in names], rel=1e-9)
+    names = (
+        "velocity",
+        "work",
+        "rotation_1",
+        "frequency",
+        "peak_acceleration",
+        "amplitude",
+        "peak_velocity",
+        "gamma0",
+    )
+    assert [found[name] for name in names] == pytest.approx(
+        [expected[name] for name in names], rel=1e-9
+    )
 
 
 def test_a_ramp_multiplies_the_displacement() -> None:
@@ -71,7 +82,9 @@ def test_a_ramp_multiplies_the_displacement() -> None:
         place, speed = boundary_motion(case.excitation, np.array([time]))
         plain = 39.2 / turn**2 * np.sin(turn * time)
         assert place[0, 0] == pytest.approx(factor * plain)
-        assert speed[0, 0] == pytest.approx(factor * 39.2 / turn * np.cos(turn * time) + slope * plain)
+        assert speed[0, 0] == pytest.approx(
+            factor * 39.2 / turn * np.cos(turn * time) + slope * plain
+        )
 
 
 def test_largest_values_are_those_at_the_largest_factor_of_a_ramp() -> None:
@@ -90,7 +103,9 @@ def test_frames_and_engines_agree_on_a_ramp(with_record: bool, tmp_path: Path) -
     """Of harmonics, and of a record with noise in two directions that does not repeat."""
     time = np.arange(0.0, 0.1, 1e-4)
     noise = np.random.default_rng(1).normal(scale=0.02, size=(2, len(time)))
-    shaken = [peak * np.sin(2.0 * pi * one * time + 1.0) for peak, one in ((4.0, 80.0), (0.3, 160.0))]
+    shaken = [
+        peak * np.sin(2.0 * pi * one * time + 1.0) for peak, one in ((4.0, 80.0), (0.3, 160.0))
+    ]
     cases = []
     for frame in ("container", "lab"):
         case = make_case(run=BRIEF, drive={"ramp": RAMP, "frame": frame})
@@ -109,7 +124,9 @@ def test_a_run_has_its_record(tmp_path: Path) -> None:
     first = run(case, tmp_path)
     (tmp_path / "other").mkdir()
     shutil.move(tmp_path / "record.csv", tmp_path / "other" / "renamed.csv")
-    again = run(changed_case(case, {"drive.record": str(tmp_path / "other" / "renamed.csv")}), tmp_path)
+    again = run(
+        changed_case(case, {"drive.record": str(tmp_path / "other" / "renamed.csv")}), tmp_path
+    )
     assert (again.directory, again.cached) == (first.directory, True)
     assert run(recorded(tmp_path, sine(44), repeats=True), tmp_path).directory != first.directory
     shutil.rmtree(tmp_path / "other")
@@ -125,8 +142,12 @@ def test_a_sweep_over_records_reads_each_of_them(tmp_path: Path) -> None:
     case = recorded(tmp_path, sine(40), repeats=True)
     for count in (44, 48):
         (tmp_path / f"{count}.csv").write_text(sine(count))
-    (tmp_path / "records.toml").write_text('case = "case.toml"\n[axes]\n"drive.record" = ["44.csv", "48.csv"]\n')
-    expected = [changed_case(case, {"drive.record": str(tmp_path / f"{count}.csv")}) for count in (44, 48)]
+    (tmp_path / "records.toml").write_text(
+        'case = "case.toml"\n[axes]\n"drive.record" = ["44.csv", "48.csv"]\n'
+    )
+    expected = [
+        changed_case(case, {"drive.record": str(tmp_path / f"{count}.csv")}) for count in (44, 48)
+    ]
     found = load_sweep(tmp_path / "records.toml").cases()
     assert [point.determinants() for point in found] == [of.determinants() for of in expected]
 
@@ -156,15 +177,22 @@ def test_cycles_of_records(tmp_path: Path) -> None:
     tones = np.sin(2.0 * pi * 160.0 * time) + 0.8 * np.sin(2.0 * pi * 240.0 * time)
     repeats = recorded(tmp_path, csv(time, y=tones), repeats=True)
     assert repeats.excitation.frequency == pytest.approx(80.0)
-    assert (repeats.excitation.fastest, repeats.drive_axis) == (pytest.approx(240.0), (0.0, 1.0, 0.0))
+    assert (repeats.excitation.fastest, repeats.drive_axis) == (
+        pytest.approx(240.0),
+        (0.0, 1.0, 0.0),
+    )
     time = np.arange(0.0, 0.3, 2e-4)
     once = recorded(tmp_path, csv(time, x=np.sin(2.0 * pi * 74.4 * time + 1.0)))
-    assert once.excitation.frequency == pytest.approx(74.4, rel=1e-3)  # a third of the way between two lines
+    assert once.excitation.frequency == pytest.approx(
+        74.4, rel=1e-3
+    )  # a third of the way between two lines
     assert once.excitation.cycles == (0.0, pytest.approx(0.2998 * 74.4, rel=1e-3))
     # Left out, a run has all whole cycles of its record, or those of its ramp.
     ramped = changed_case(repeats, {"drive.ramp": RAMP})
     assert [load_case({**one.document, "run": {}}).run.cycles for one in (once, ramped)] == [22, 5]
-    direction = recorded(tmp_path, csv(time, x=tones[0] + np.sin(500.0 * time), y=-np.sin(500.0 * time))).excitation
+    direction = recorded(
+        tmp_path, csv(time, x=tones[0] + np.sin(500.0 * time), y=-np.sin(500.0 * time))
+    ).excitation
     assert direction.direction == pytest.approx((0.5**0.5, -(0.5**0.5), 0.0))
 
 
@@ -184,7 +212,11 @@ def test_a_ramp_finds_the_threshold(ramp: list[float], name: str, tmp_path: Path
     assert found[name] == pytest.approx(weakest, rel=1e-6)
     first, *others = done.describe().split("\n")
     assert first == f"fig1b: {name.replace('_', ' ')} {found[name] / 9.8:.4g} g"
-    assert [line for line in others if re.fullmatch(rf"  {declared(name).label} .*  resolution \S+", line)]
+    assert [
+        line
+        for line in others
+        if re.fullmatch(rf"  {declared(name).label} .*  resolution \S+", line)
+    ]
     # Means over a drive that changes say nothing, nor does it that they are not steady.
     assert (found["steady"], found.warnings) == (0, [])
     assert not {"velocity", "rotation_1", "work", "steady"} & {row.name for row in rows(found)}
@@ -238,7 +270,9 @@ def test_a_plateau_at_the_start_does_not_rise() -> None:
         ([[1], [1]], (nan, nan)),
     ],
 )
-def test_the_last_window_in_which_a_walker_moves(moves: list[list[int]], expected: tuple[float, float]) -> None:
+def test_the_last_window_in_which_a_walker_moves(
+    moves: list[list[int]], expected: tuple[float, float]
+) -> None:
     """Mean over walkers; one that never moves, or never rests, has none."""
     peaks = np.array([4.0, 3.0, 2.0])[: len(moves)]
     crossed = _crossed(np.array(moves, dtype=np.bool_), peaks, np.full(len(moves), 0.5))

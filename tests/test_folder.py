@@ -55,7 +55,9 @@ def out(looked_through: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def _listed(*arguments: str) -> list[dict[str, Any]]:
-    rows: list[dict[str, Any]] = json.loads(call("list", "--json", "--all", *arguments, check=True).stdout)
+    rows: list[dict[str, Any]] = json.loads(
+        call("list", "--json", "--all", *arguments, check=True).stdout
+    )
     return rows
 
 
@@ -73,21 +75,32 @@ def test_list_has_all_runs_and_sweeps_with_their_results(out: Path) -> None:
     failed, interrupted = (_unfinished(name, failed=name == "slow") for name in ("slow", "killed"))
     rows = _listed()
     (sweep,) = (row for row in rows if row["name"] == "three")
-    assert sweep["varies"] == {"contact.friction.bead_wall": 2, "drive.frequency": 2, "drive.peak_acceleration": 3}
+    assert sweep["varies"] == {
+        "contact.friction.bead_wall": 2,
+        "drive.frequency": 2,
+        "drive.peak_acceleration": 3,
+    }
     assert sweep["points"] == {"finished": 12}
     runs = {row["name"]: row for row in rows if row["kind"] == "run"}
     slow, killed = (path.name.removesuffix(".incomplete") for path in (failed, interrupted))
     assert runs.keys() == finished_places(out).keys() | {slow, killed}
     for _, point in walkers.load(out / "three").table().iterrows():
-        row, files = runs[Path(point["run"]).name], [path for path in Path(point["run"]).rglob("*") if path.is_file()]
+        row, files = (
+            runs[Path(point["run"]).name],
+            [path for path in Path(point["run"]).rglob("*") if path.is_file()],
+        )
         expected = ("finished", point["velocity"], sum(path.stat().st_size for path in files))
         assert (row["status"], row["velocity"], row["size"]) == expected
     assert (runs[slow]["status"], runs[slow]["reason"]) == ("failed", "TimeLimitExceeded")
     assert runs[killed]["status"] == "interrupted"
     with locked([out / killed]):
-        assert [row["directory"] for row in _listed() if row["status"] == "running"] == [str(interrupted)]
+        assert [row["directory"] for row in _listed() if row["status"] == "running"] == [
+            str(interrupted)
+        ]
     # It reads neither dumps nor tables.
-    for path in [path for pattern in ("*.bin", "*.parquet", "*.txt") for path in out.rglob(pattern)]:
+    for path in [
+        path for pattern in ("*.bin", "*.parquet", "*.txt") for path in out.rglob(pattern)
+    ]:
         path.unlink()
     again = {row["name"]: row for row in _listed()}
     assert [again[row["name"]]["numbers"] for row in rows] == [row["numbers"] for row in rows]
@@ -114,12 +127,17 @@ def test_list_has_a_column_for_each_value_that_differs(out: Path) -> None:
         (("friction.bead_wall=0.2",), 6),
         (("friction.bead_wall=0.3",), 0),
         (("colour=red",), '"colour=red": no run has such a key'),
-        (("friction.bead_wall=5 mm",), 'friction.bead_wall=5 mm": expected a number without a unit'),
+        (
+            ("friction.bead_wall=5 mm",),
+            'friction.bead_wall=5 mm": expected a number without a unit',
+        ),
     ],
     ids=str,
 )
 def test_list_selects_by_values(out: Path, where: tuple[str, ...], number: int | str) -> None:
-    ended = call("list", "--json", *(word for condition in where for word in ("--where", condition)))
+    ended = call(
+        "list", "--json", *(word for condition in where for word in ("--where", condition))
+    )
     if isinstance(number, str):
         assert number in ended.stderr
         assert ended.returncode == 2
@@ -128,7 +146,9 @@ def test_list_selects_by_values(out: Path, where: tuple[str, ...], number: int |
 
 
 def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
-    Path("rest.toml").write_text('case = "base.toml"\n[axes]\ndrive.peak_acceleration = ["0.2 g", "0.3 g"]\n')
+    Path("rest.toml").write_text(
+        'case = "base.toml"\n[axes]\ndrive.peak_acceleration = ["0.2 g", "0.3 g"]\n'
+    )
     call("sweep", "rest.toml", check=True)
     table = walkers.load(out / "rest").table()
     assert (table["velocity"].abs() > 0.0).all()
@@ -155,13 +175,18 @@ def test_the_table_of_a_finished_sweep_is_read_once_until_it_is_refreshed(out: P
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"format": 99}, "its format is 99, expected 4); run the sweep again: finished runs are kept"),
+        (
+            {"format": 99},
+            "its format is 99, expected 4); run the sweep again: finished runs are kept",
+        ),
         ({"runs": ["base-0123456789ab"]}, "1 runs, expected the names of 6"),
         ({"base": None}, "cannot be read"),
         ({"file": {"case": "base", "axes": {"drive.frequncy": [1]}}}, 'did you mean "frequency"'),
     ],
 )
-def test_a_sweep_of_another_format_is_refused(out: Path, change: dict[str, Any], message: str) -> None:
+def test_a_sweep_of_another_format_is_refused(
+    out: Path, change: dict[str, Any], message: str
+) -> None:
     write_json(out / "grid" / "sweep.json", {**read_json(out / "grid" / "sweep.json"), **change})
     for command in ("list grid", "clean rough --yes"):
         done = call(*command.split())
@@ -171,9 +196,14 @@ def test_a_sweep_of_another_format_is_refused(out: Path, change: dict[str, Any],
 def test_clean_removes_leftovers_alone(out: Path) -> None:
     """No run in progress, and no folder of somebody else's unless it has in it what an unfinished run has."""
     failed, interrupted, held = (
-        _unfinished(name, failed=failed) for name, failed in {"slow": True, "killed": False, "held": False}.items()
+        _unfinished(name, failed=failed)
+        for name, failed in {"slow": True, "killed": False, "held": False}.items()
     )
-    stale, lock, thesis = out / "gone-0123456789ab.lock", out / "poetry.lock", out / "thesis.incomplete"
+    stale, lock, thesis = (
+        out / "gone-0123456789ab.lock",
+        out / "poetry.lock",
+        out / "thesis.incomplete",
+    )
     before = finished_places(out)
     thesis.mkdir()
     for path in (stale, lock, thesis / "chapter.txt"):
@@ -183,7 +213,11 @@ def test_clean_removes_leftovers_alone(out: Path) -> None:
         refused = call("clean")  # where there is no terminal
         total = refused.stdout.splitlines()[-1].partition(" to remove")[0]
         assert {*total.split(", ")} == {"1 failed run", "1 interrupted run", "1 stale lock"}
-        assert (refused.returncode, "no terminal" in refused.stderr, failed.exists()) == (2, True, True)
+        assert (refused.returncode, "no terminal" in refused.stderr, failed.exists()) == (
+            2,
+            True,
+            True,
+        )
         call("clean", "--yes", check=True)
     assert not any(path.exists() for path in (failed, interrupted, stale))
     assert all(path.exists() for path in (held, lock, thesis / "chapter.txt"))
@@ -193,17 +227,23 @@ def test_clean_removes_leftovers_alone(out: Path) -> None:
 def test_clean_keeps_runs_that_other_sweeps_have(out: Path) -> None:
     """With a run go its spread and its accuracy: here runs that only the accuracy has, those of beads."""
     names = ("grid", "rough", "three", "beads")
-    runs = {name: {Path(run).name for run in walkers.load(out / name).table()["run"]} for name in names}
+    runs = {
+        name: {Path(run).name for run in walkers.load(out / name).table()["run"]} for name in names
+    }
     before = finished_places(out)
     size = bytes_text(sum(weigh(out / name)[0] for name in ("grid", "rough")))
-    assert f"2 sweeps to remove, {size}" in call("clean", "grid", "rough", "--yes", check=True).stdout
+    assert (
+        f"2 sweeps to remove, {size}" in call("clean", "grid", "rough", "--yes", check=True).stdout
+    )
     assert before.keys() == finished_places(out).keys()
     assert not any((out / name).exists() for name in ("grid", "rough"))
     one = sorted(runs["three"] - runs["beads"])[0]
     (out / "beads").rename(out / f"{one}-accuracy")
     shutil.copytree(out / "three", out / f"{one}-spread")
     shown = call("clean", str(finished_places(out)[one]), "--yes", check=True).stdout
-    assert re.search(rf"(?m)^{one} +finished run .*  needed by the sweep three, which would run it again$", shown)
+    assert re.search(
+        rf"(?m)^{one} +finished run .*  needed by the sweep three, which would run it again$", shown
+    )
     assert before.keys() - finished_places(out).keys() == (runs["beads"] - runs["three"]) | {one}
     assert not [*out.glob(f"{one}-*")]
     assert walkers.load(out / "three").table()["status"].tolist().count("missing") == 1
@@ -212,7 +252,10 @@ def test_clean_keeps_runs_that_other_sweeps_have(out: Path) -> None:
 def test_clean_takes_no_named_run_that_a_process_computes(out: Path) -> None:
     """Nor the sweep that alone has it, nor any other run that is named beside it."""
     places = finished_places(out)
-    runs = {name: {Path(run).name for run in walkers.load(out / name).table()["run"]} for name in ("beads", "three")}
+    runs = {
+        name: {Path(run).name for run in walkers.load(out / name).table()["run"]}
+        for name in ("beads", "three")
+    }
     busy, other = sorted(runs["beads"] - runs["three"])[:2]
     shutil.rmtree(places[busy])
     with locked([out / busy]):
@@ -224,7 +267,9 @@ def test_clean_takes_no_named_run_that_a_process_computes(out: Path) -> None:
     assert (out / "beads" / "sweep.json").is_file()
 
 
-def test_clean_holds_the_lock_and_takes_the_manifest_first(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_clean_holds_the_lock_and_takes_the_manifest_first(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A removal that ends in between leaves no finished run, and a run that was locked after the question stays."""
     first, second = list(finished_places(out).values())[:2]
     removals = named_in(out, [first, second])
@@ -254,7 +299,9 @@ def test_a_removal_that_is_interrupted_leaves_the_case_until_the_end(out: Path) 
     names = {entry.name for entry in place.iterdir()}
     left = []
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("walkers.runs.removal._remove_directory", lambda folder: left.extend(folder.iterdir()))
+        patched.setattr(
+            "walkers.runs.removal._remove_directory", lambda folder: left.extend(folder.iterdir())
+        )
         remove(named_in(out, [place]))
     assert len(names) > 3
     assert [entry.name for entry in left] == ["case.json"]
@@ -288,11 +335,16 @@ def test_a_lock_that_a_process_has_taken_since_stays(out: Path) -> None:
 def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
     table = walkers.load(out / "beads").table().set_index(["liquid.name", "dimers.radii[0]"])
     rows = [table.loc[("Si AK5", 0.3)], table.loc[("Si AK10", 0.3)]]
-    found = json.loads(call("compare", *(Path(row["run"]).name for row in rows), "--json", check=True).stdout)
+    found = json.loads(
+        call("compare", *(Path(row["run"]).name for row in rows), "--json", check=True).stdout
+    )
     # What is given, then what follows from it.
     assert [*found["sources"].items()] == [
         ("liquid.name", ["given"] * 2),
-        *((f"liquid.{name}", ["library"] * 2) for name in ("surface_tension", "density", "kinematic_viscosity")),
+        *(
+            (f"liquid.{name}", ["library"] * 2)
+            for name in ("surface_tension", "density", "kinematic_viscosity")
+        ),
         ("liquid.dynamic_viscosity", ["derived"] * 2),
     ]
     assert found["parameters"]["liquid.name"] == ["Si AK5", "Si AK10"]
@@ -305,9 +357,13 @@ def test_compare_tells_parameters_and_results_of_two_runs(out: Path) -> None:
     # Cases may be named, and one that was not run; changes are of the second side.
     told = call("compare", "base.toml", "fig4a", check=True).stdout
     assert "0.6 mm, 0.3 mm" in told and "fig4a: no finished run" in told
-    assert "all results are the same" in call("compare", "base.toml", "base.toml", check=True).stdout
+    assert (
+        "all results are the same" in call("compare", "base.toml", "base.toml", check=True).stdout
+    )
     for sides in (["base.toml"], ["base.toml", "base.toml"]):
-        found = json.loads(call("compare", *sides, "--set", "drive.frequency=90Hz", "--json", check=True).stdout)
+        found = json.loads(
+            call("compare", *sides, "--set", "drive.frequency=90Hz", "--json", check=True).stdout
+        )
         assert next(iter(found["parameters"].items())) == ("drive.frequency", [80.0, 90.0])
         assert found["second"] == "base.toml drive.frequency=90Hz" == found["not_run"][0]
 
@@ -349,17 +405,25 @@ def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
     """Errors of 3 and 4 µm/s make 5 µm/s of a difference of -50 µm/s; each run has its band beside it."""
     heads = {"velocity": 10, "right_facing": 20}
     settings = {**TINY, "cycles": 5}  # no other test's run
-    run = run_directory(run=settings, uncertain={"contact": {"friction": {"bead_wall": [0.05, 0.2]}}})
-    fast = _changed(run, tmp_path, "fast", 3e-6, velocity=1.05e-3, right_facing=1.1e-3, scatter=4e-9)
+    run = run_directory(
+        run=settings, uncertain={"contact": {"friction": {"bead_wall": [0.05, 0.2]}}}
+    )
+    fast = _changed(
+        run, tmp_path, "fast", 3e-6, velocity=1.05e-3, right_facing=1.1e-3, scatter=4e-9
+    )
     slow = _changed(run, tmp_path, "slow", 4e-6, velocity=1e-3, right_facing=1e-3)
     (spread := spread_of(tmp_path / "slow")).mkdir()
     band = {"velocity": {"low": 8e-4, "high": 1.2e-3, "points": 64}}
-    write_json(spread / SPREAD_NAME, {"varied": read_json(run / "result.json")["rests_on"], "bands": band})
+    write_json(
+        spread / SPREAD_NAME, {"varied": read_json(run / "result.json")["rests_on"], "bands": band}
+    )
     found = compare_runs(fast, slow)
     (velocity,) = (one for one in found.contents["results"] if one["quantity"] == "velocity")
     assert velocity["difference"] == pytest.approx(-5e-5)
     assert velocity["numerical_error"] == pytest.approx(hypot(3e-6, 4e-6))
-    lines = [f"{name}: differs by {times} times its numerical error" for name, times in heads.items()]
+    lines = [
+        f"{name}: differs by {times} times its numerical error" for name, times in heads.items()
+    ]
     lines += [
         "fast: velocity rests on 1 uncertain value, 0 guessed; the band over the ranges is not computed (--spread)",
         "slow: velocity (mm/s), band 0.8 to 1.2 (64 draws)",
@@ -368,18 +432,27 @@ def test_compared_runs_differ_by_so_many_times_both_their_numerical_errors(
     ]
     assert "\n".join(["\n", *lines, ""]) in found.text and "--accuracy" not in found.text
     assert re.search(r"\nvelocity \(mm/s\) +1\.05 +1 +-0\.05 +below 0\.001 +0\.005\n", found.text)
-    assert "\n\nscatter of copies: how much copies differ by their start; no error of the difference\n" in found.text
+    assert (
+        "\n\nscatter of copies: how much copies differ by their start; no error of the difference\n"
+        in found.text
+    )
     # Without them the table has no column for them, and a line says how to have them.
     rough = _changed(run, tmp_path, "rough", velocity=1.2e-3)
     found = compare_runs(fast, rough)
-    assert f"\nto measure numerical errors: walkers run {rough.directory} --accuracy\n" in found.text
+    assert (
+        f"\nto measure numerical errors: walkers run {rough.directory} --accuracy\n" in found.text
+    )
     assert re.search(r"\nresult +fast +rough +difference +scatter of copies\n", found.text)
 
 
 @pytest.mark.parametrize(
     ("numbers", "shown"),
     [
-        *(({"goes_uphill": True}, True), ({"goes_uphill": True, "upright": 0}, False), ({"goes_uphill": False}, False)),
+        *(
+            ({"goes_uphill": True}, True),
+            ({"goes_uphill": True, "upright": 0}, False),
+            ({"goes_uphill": False}, False),
+        ),
         ({"goes_uphill": True, "came_apart": True}, False),
     ],
 )
@@ -388,28 +461,46 @@ def test_a_level_run_and_others_have_the_velocity_in_common_unless_it_says_littl
 ) -> None:
     """Of a slope it is that of walkers that face up, and is marked; on a level plate a mean over two says little."""
     run = run_directory(run=TINY)
-    other = _changed(run, tmp_path, "other", velocity=1e-3, facings_differ=True, facing_left=3, **numbers)
+    other = _changed(
+        run, tmp_path, "other", velocity=1e-3, facings_differ=True, facing_left=3, **numbers
+    )
     found = compare_runs(Side("level", case_of(run), run), other)
     shared = {row["quantity"] for row in found.contents["results"] if row["second"] is not None}
     assert bool(re.search(r"\nvelocity \(mm/s\) +[\d.]+ +1 facing up ", found.text)) == shown
-    assert ("velocity" in shared) == shown and ("axial_velocity" in shared) == ("came_apart" not in numbers)
+    assert ("velocity" in shared) == shown and ("axial_velocity" in shared) == (
+        "came_apart" not in numbers
+    )
 
 
 def test_values_are_shown_as_a_case_file_has_them() -> None:
     """Keys with the same last part too: of friction and of roughness."""
-    values = {"boundary.opening": 1.0, "liquid.temperature": 293.15, "contact.friction.bead_wall": 0.2}
-    texts = [readable(key, value) for key, value in {**values, "drive.ramp": [[0.0, 1.0], [1.2, 0.5]]}.items()]
+    values = {
+        "boundary.opening": 1.0,
+        "liquid.temperature": 293.15,
+        "contact.friction.bead_wall": 0.2,
+    }
+    texts = [
+        readable(key, value)
+        for key, value in {**values, "drive.ramp": [[0.0, 1.0], [1.2, 0.5]]}.items()
+    ]
     assert texts == ["57.2958 deg", "20 degC", "0.2", "(0 s, 1), (1.2 s, 0.5)"]
 
 
 def test_a_pile_that_was_interrupted_says_how_much_of_it_is_done(in_folder: Path) -> None:
     """It continues after its last complete segment, of which there is one of three here."""
-    short = {"longest_settling": "0 s", "duration": "0.03 s", "time_step": "3 us", "segment": "0.01 s"}
+    short = {
+        "longest_settling": "0 s",
+        "duration": "0.03 s",
+        "time_step": "3 us",
+        "segment": "0.01 s",
+    }
     tables = {**read_toml(shipped("case")["pile-ci"]), "run": short}
     (in_folder / "pile.toml").write_text(to_toml(tables))
     (in_folder / "piles.toml").write_text('case = "pile.toml"\n[axes]\nrun.seed = [1, 2]\n')
     program = subprocess.Popen(
-        [PROGRAM, "sweep", "piles.toml", "-j", "1"], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+        [PROGRAM, "sweep", "piles.toml", "-j", "1"],
+        stderr=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
     )
     try:
         wait_for(lambda: list(in_folder.rglob("segments/0000/segment.json")))
@@ -452,7 +543,9 @@ def test_the_end_of_the_input_removes_nothing(out: Path) -> None:
     run = next(iter(finished_places(out).values()))
     ours, theirs = pty.openpty()
     command = [PROGRAM, "clean", run.name]
-    program = subprocess.Popen(command, stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    program = subprocess.Popen(
+        command, stdin=theirs, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
     os.write(ours, b"\x04")
     told, _ = program.communicate(timeout=PATIENCE)
     os.close(ours)
@@ -460,12 +553,18 @@ def test_the_end_of_the_input_removes_nothing(out: Path) -> None:
     assert (program.returncode, told.splitlines()[-1], run.exists()) == (0, "nothing removed", True)
 
 
-def test_a_large_sweep_says_how_far_it_is_before_it_runs(out: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_large_sweep_says_how_far_it_is_before_it_runs(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Here of twelve points, each of which is told."""
     monkeypatch.setattr("walkers.sweeps.scheduler._RESOLVED_AT_ONCE", 1)
     sweep, told = read_record(out / "three").sweep, list[str]()
-    plan = plan_sweep(sweep, out, Options(1), on_progress=lambda progress: told.append(progress.text))
-    assert [text.partition(",")[0] for text in told] == [f"{n} of 12 points resolved" for n in range(1, 13)]
+    plan = plan_sweep(
+        sweep, out, Options(1), on_progress=lambda progress: told.append(progress.text)
+    )
+    assert [text.partition(",")[0] for text in told] == [
+        f"{n} of 12 points resolved" for n in range(1, 13)
+    ]
     assert len(plan.cases) == 12
 
 

@@ -34,7 +34,13 @@ QUANTITIES = {
     units.LENGTH: {"0.3 mm": 3e-4, "300 µm": 3e-4, "300um": 3e-4, "3e-4 m": 3e-4},
     units.FREQUENCY: {"80 Hz": 80.0, "0.08 kHz": 80.0, "80 s^-1": 80.0},
     # "1 g = 9.8 m/s²", the paper's Fig. 1
-    units.ACCELERATION: {"1 g": 9.8, "4g": 39.2, "39.2 m/s^2": 39.2, "39.2 m/s²": 39.2, "1 gravity": 9.80665},
+    units.ACCELERATION: {
+        "1 g": 9.8,
+        "4g": 39.2,
+        "39.2 m/s^2": 39.2,
+        "39.2 m/s²": 39.2,
+        "1 gravity": 9.80665,
+    },
     units.SURFACE_TENSION: {"19.2 mN/m": 0.0192, "19.2 dyn/cm": 0.0192},
     units.KINEMATIC_VISCOSITY: {"5 mm^2/s": 5e-6, "5 cSt": 5e-6},
     units.DYNAMIC_VISCOSITY: {"4.6 mPa*s": 4.6e-3, "4.6 cP": 4.6e-3},
@@ -55,7 +61,9 @@ NO_QUANTITIES = {
 
 def test_quantities_are_read_in_si_and_nothing_else_is() -> None:
     for kind, texts in QUANTITIES.items():
-        assert {text: parse_quantity(text, kind) for text in texts} == pytest.approx(texts, rel=1e-14)
+        assert {text: parse_quantity(text, kind) for text in texts} == pytest.approx(
+            texts, rel=1e-14
+        )
     for kind, wrong in NO_QUANTITIES.items():
         for text in wrong:
             with pytest.raises(ValueError, match=f"expected an? {kind.name} with its unit"):
@@ -76,7 +84,9 @@ def test_quantities_are_read_in_si_and_nothing_else_is() -> None:
         ("1e30 inch", units.LENGTH, "3.937e-08 and 39.37 inch"),
     ],
 )
-def test_bounds_of_a_quantity_are_told_in_its_unit(text: str, kind: units.Kind, bounds: str) -> None:
+def test_bounds_of_a_quantity_are_told_in_its_unit(
+    text: str, kind: units.Kind, bounds: str
+) -> None:
     with pytest.raises(ValueError, match=f"it must lie between {re.escape(bounds)}$"):
         parse_quantity(text, kind)
 
@@ -88,7 +98,11 @@ GLASS = {
     "liquid": {"name": "ethylene glycol"},
     "boundary": {"material": "polystyrene"},
     "drive": {"frequency": "80 Hz", "peak_acceleration": "10 g"},
-    "contact": {"friction": {"bead_bead": 0.3, "bead_wall": 0.3}, "rolling_friction": 0.0, "youngs_modulus": "10 MPa"},
+    "contact": {
+        "friction": {"bead_bead": 0.3, "bead_wall": 0.3},
+        "rolling_friction": 0.0,
+        "youngs_modulus": "10 MPa",
+    },
     "uncertain": {"contact": {"friction": {"bead_wall": {"loguniform": [0.1, 0.6]}}}},
 }
 
@@ -103,32 +117,56 @@ def test_values_know_where_they_come_from() -> None:
     assert friction.range is not None
     assert friction.range[0] < float(friction.text) < friction.range[1]
     assert found["dimers.replicates"] == Origin("dimers.replicates", "6", "default")
-    assert found["liquid.dynamic_viscosity"].text == "4.6 mPa*s"  # 5 mm²/s times 0.92 g/cm³, not that of the bridges
+    assert (
+        found["liquid.dynamic_viscosity"].text == "4.6 mPa*s"
+    )  # 5 mm²/s times 0.92 g/cm³, not that of the bridges
     assert found["run.time_step"].source.startswith("auto: 0.4 of the rayleigh limit, ")
     assert not any(one.guessed for one in found.values())
     # What was calibrated with other liquids, or another law, is a guess.
-    assert origins(load_case("fig1b", {"liquid.name": "Si AK10"}))["liquid.meniscus_radius"].origin == "calibrated"
-    menisci = origins(load_case("fig1b", {"liquid.name": "glycerol 87 %"}))["liquid.meniscus_radius"]
+    assert (
+        origins(load_case("fig1b", {"liquid.name": "Si AK10"}))["liquid.meniscus_radius"].origin
+        == "calibrated"
+    )
+    menisci = origins(load_case("fig1b", {"liquid.name": "glycerol 87 %"}))[
+        "liquid.meniscus_radius"
+    ]
     assert (menisci.origin, menisci.text, menisci.guessed) == ("default", "70 um", True)
     assert menisci.range == unmeasured()["liquid.meniscus_radius"].range
-    assert origins(load_case("fig1b", {"liquid.law": "willett"}))["contact.rolling_friction"].guessed
+    assert origins(load_case("fig1b", {"liquid.law": "willett"}))[
+        "contact.rolling_friction"
+    ].guessed
     # What a case gives is guessed if it is called uncertain.
     guessed = {key: one.text for key, one in origins(build_case(GLASS)).items() if one.guessed}
-    unknown = {"contact.restitution": "0.3", "liquid.volume_fraction": "0.01", "liquid.contact_angle": "0 deg"}
+    unknown = {
+        "contact.restitution": "0.3",
+        "liquid.volume_fraction": "0.01",
+        "liquid.contact_angle": "0 deg",
+    }
     assert guessed == {**unknown, "contact.friction.bead_wall": "0.3"}
 
 
 def test_what_is_called_uncertain_keeps_where_it_comes_from(tmp_path: Path) -> None:
-    ranges = {"liquid.surface_tension": ["15 mN/m", "25 mN/m"], "contact.friction.bead_wall": [0.1, 0.4]}
+    ranges = {
+        "liquid.surface_tension": ["15 mN/m", "25 mN/m"],
+        "contact.friction.bead_wall": [0.1, 0.4],
+    }
     ranges["dimers.radii[1]"] = ["0.19 mm", "0.2 mm"]  # an end may be the value of the case
-    (file := tmp_path / "ranges.toml").write_text(to_toml({**load_case("fig1b").document, "uncertain": ranges}))
+    (file := tmp_path / "ranges.toml").write_text(
+        to_toml({**load_case("fig1b").document, "uncertain": ranges})
+    )
     found = origins(case := load_case(file))
     tension, friction, radius = (found[key] for key in ranges)
-    assert (tension.origin, tension.text, tension.range) == ("library", "19.2 mN/m", ("15 mN/m", "25 mN/m"))
+    assert (tension.origin, tension.text, tension.range) == (
+        "library",
+        "19.2 mN/m",
+        ("15 mN/m", "25 mN/m"),
+    )
     assert (friction.origin, friction.guessed, friction.range) == ("calibrated", True, (0.1, 0.4))
     assert (radius.text, radius.guessed) == ("0.2 mm", True)
     assert ", uncertain, range 0.1 to 0.4" in call("show", str(file), check=True).stdout
-    assert "uncertain  surface_tension 19.2 mN/m" in "\n".join(lines_of_rest(rests_on(case.origins)))
+    assert "uncertain  surface_tension 19.2 mN/m" in "\n".join(
+        lines_of_rest(rests_on(case.origins))
+    )
     assert {*ranges} < set(spread_sweep(case, 2).keys)
     # Points of sweeps may leave the range; the case itself may not.
     tables = {**GLASS, "uncertain": {"contact.friction.bead_wall": [0.4, 0.6]}}
@@ -156,32 +194,70 @@ def test_a_case_is_changed_as_its_file_would_be() -> None:
     """All values follow, with their origins; the case itself stays as it was."""
     case = load_case("fig1b", {"run.cycles": 2, "run.settling_cycles": 0, "dimers.replicates": 1})
     faster = changed_case(
-        case, {"drive.frequency": "120 Hz", "contact.friction.bead_wall": 0.5, "liquid.name": "Si AK10"}
+        case,
+        {"drive.frequency": "120 Hz", "contact.friction.bead_wall": 0.5, "liquid.name": "Si AK10"},
     )
     assert (case.drive.frequency, changed_case(case, {})) == (80.0, case)
-    assert (faster.drive.frequency, faster.contact.friction.bead_wall, faster.name) == (120.0, 0.5, "fig1b")
+    assert (faster.drive.frequency, faster.contact.friction.bead_wall, faster.name) == (
+        120.0,
+        0.5,
+        "fig1b",
+    )
     assert faster.run.period == pytest.approx(1.0 / 120.0, rel=1e-12)
     assert faster.liquid.dynamic_viscosity == pytest.approx(9.3e-3)
     assert origins(faster)["contact.friction.bead_wall"].word == "given"
     assert faster == build_case(faster.document, name="fig1b")
-    assert "<tr><td>drive.frequency</td><td>80 Hz</td><td>given</td><td></td></tr>" in case._repr_html_()
+    assert (
+        "<tr><td>drive.frequency</td><td>80 Hz</td><td>given</td><td></td></tr>"
+        in case._repr_html_()
+    )
     # What says the same in other words goes, in one of several harmonics as well.
     assert changed_case(case, {"drive.gamma0": 0.5}).drive.peak_acceleration > 50.0
     first, last = ({f"drive.harmonics[{number}].peak_acceleration": "2 g"} for number in (0, 1))
     tables = {"drive": {"harmonics": [{"gamma0": 0.4, "axis": "x"}, {"gamma0": 0.2}]}}
     assert changed(CaseFile, tables, last)["drive"]["harmonics"][1] == {"peak_acceleration": "2 g"}
     both = {"gamma0": 0.3, "axis": "x", "peak_acceleration": "2 g"}  # each as it is said
-    assert changed(CaseFile, tables, {**first, "drive.harmonics[0].gamma0": 0.3})["drive"]["harmonics"][0] == both
+    assert (
+        changed(CaseFile, tables, {**first, "drive.harmonics[0].gamma0": 0.3})["drive"][
+            "harmonics"
+        ][0]
+        == both
+    )
 
 
-HARMONICS = [{"frequency": "80 Hz", "gamma0": 0.2}, {"frequency": "120 Hz", "peak_acceleration": "1 g", "axis": "y"}]
+HARMONICS = [
+    {"frequency": "80 Hz", "gamma0": 0.2},
+    {"frequency": "120 Hz", "peak_acceleration": "1 g", "axis": "y"},
+]
 ODD: dict[str, dict[str, Any]] = {
     "harmonics": {"drive": {"harmonics": HARMONICS}},
-    "aslant": {"drive": {**REFERENCE["drive"], "axis": [1, 0, 2], "waveform": "sawtooth", "phase": "10 deg"}},
-    "places": {"clusters": [{"diameters": ["0.6 mm", "0.4 mm"], "at": [["0.2 mm", "0 mm"], ["-0.29 mm", "0 mm"]]}]},
-    "mean": {"dimers": {"mean_radius": "0.25 mm", "sin_delta": 0.2, "spacing": "auto"}, "run": {"cycles": "auto"}},
-    "placed": {"placed": [{"diameter": "2 mm", "at": ["19 mm", "0 mm", "1 mm"]}], "run": {"duration": "0.1 s"}},
-    "uncertain": {"uncertain": {"dimers.radii[1]": ["0.1 mm", "0.3 mm"], "contact": {"restitution": [0.2, 0.4]}}},
+    "aslant": {
+        "drive": {
+            **REFERENCE["drive"],
+            "axis": [1, 0, 2],
+            "waveform": "sawtooth",
+            "phase": "10 deg",
+        }
+    },
+    "places": {
+        "clusters": [
+            {"diameters": ["0.6 mm", "0.4 mm"], "at": [["0.2 mm", "0 mm"], ["-0.29 mm", "0 mm"]]}
+        ]
+    },
+    "mean": {
+        "dimers": {"mean_radius": "0.25 mm", "sin_delta": 0.2, "spacing": "auto"},
+        "run": {"cycles": "auto"},
+    },
+    "placed": {
+        "placed": [{"diameter": "2 mm", "at": ["19 mm", "0 mm", "1 mm"]}],
+        "run": {"duration": "0.1 s"},
+    },
+    "uncertain": {
+        "uncertain": {
+            "dimers.radii[1]": ["0.1 mm", "0.3 mm"],
+            "contact": {"restitution": [0.2, 0.4]},
+        }
+    },
     "slope": {"boundary": {"material": "glass", "tilt": "20 deg", "uphill": "180 deg"}},
     "mixed": {"liquid": {"name": "water-glycerol", "mass_fraction": 0.87}},
 }
@@ -202,12 +278,25 @@ def test_a_case_is_kept_as_json(name: str) -> None:
 
 
 RESOLVED = {
-    "fig1b": ("run.time_step", "run.cycles", "contact.youngs_modulus", "dimers.radii", "dimers.spacing"),
-    "pile-ci": ("run.settling_cycles", "run.samples_per_cycle", "mixture.small", "liquid.dynamic_viscosity"),
+    "fig1b": (
+        "run.time_step",
+        "run.cycles",
+        "contact.youngs_modulus",
+        "dimers.radii",
+        "dimers.spacing",
+    ),
+    "pile-ci": (
+        "run.settling_cycles",
+        "run.samples_per_cycle",
+        "mixture.small",
+        "liquid.dynamic_viscosity",
+    ),
 }
 
 
-@pytest.mark.parametrize(("name", "key"), [(name, key) for name, keys in RESOLVED.items() for key in keys])
+@pytest.mark.parametrize(
+    ("name", "key"), [(name, key) for name, keys in RESOLVED.items() for key in keys]
+)
 def test_a_resolved_case_lacks_no_value(name: str, key: str) -> None:
     """A file may leave it out; stored values without it are those of no case."""
     case = load_case(name)
@@ -229,12 +318,19 @@ def test_a_harmonic_has_a_direction() -> None:
         stored_case(values)
 
 
-def test_the_schema_refuses_what_the_program_refuses(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_schema_refuses_what_the_program_refuses(
+    in_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """And keeps all shipped cases; a new case may name it, and is a case as it was without."""
-    monkeypatch.setitem(sys.modules, "rfc3987_syntax", None)  # a grammar of addresses, which takes three seconds
+    monkeypatch.setitem(
+        sys.modules, "rfc3987_syntax", None
+    )  # a grammar of addresses, which takes three seconds
     from jsonschema import Draft202012Validator
 
-    assert call("new", "mine", "cluster", "--schema", check=True).stdout == "mine.toml\ncase.schema.json\n"
+    assert (
+        call("new", "mine", "cluster", "--schema", check=True).stdout
+        == "mine.toml\ncase.schema.json\n"
+    )
     assert Path("mine.toml").read_text().startswith("#:schema case.schema.json\n\n")
     assert load_case("mine").determinants() == load_case("cluster").determinants()
     schema = Draft202012Validator(json.loads(Path("case.schema.json").read_text()))
@@ -277,7 +373,9 @@ def test_water_and_glycerol_are_as_tabulated_and_follow_fraction_and_temperature
         found = water_glycerol(share, celsius + 273.15)
         assert found["dynamic_viscosity"] == pytest.approx(1e-3 * viscosity, rel=0.03)
         assert found["density"] == pytest.approx(1e3 * density, rel=5e-4)
-        assert tension is None or found["surface_tension"] == pytest.approx(1e-3 * tension, rel=3e-3)
+        assert tension is None or found["surface_tension"] == pytest.approx(
+            1e-3 * tension, rel=3e-3
+        )
 
     def of(**liquid: Any) -> Case:
         return make_case(liquid={"name": "water-glycerol", "mass_fraction": 0.87, **liquid})
@@ -285,8 +383,14 @@ def test_water_and_glycerol_are_as_tabulated_and_follow_fraction_and_temperature
     case = of()
     assert case.liquid.dynamic_viscosity == pytest.approx(0.1448)  # Cheng's formula by hand
     assert case.liquid.density == pytest.approx(1227.0)
-    temperature, viscosity = (origins(case)[f"liquid.{key}"] for key in ("temperature", "dynamic_viscosity"))
-    assert (temperature.text, temperature.origin, "Cheng" in viscosity.source) == ("20 degC", "default", True)
+    temperature, viscosity = (
+        origins(case)[f"liquid.{key}"] for key in ("temperature", "dynamic_viscosity")
+    )
+    assert (temperature.text, temperature.origin, "Cheng" in viscosity.source) == (
+        "20 degC",
+        "default",
+        True,
+    )
     assert of(temperature="293.15 K").determinants() == case.determinants()
     assert of(temperature="25 degC").liquid.dynamic_viscosity < 0.8 * case.liquid.dynamic_viscosity
     pure, computed = make_case(liquid={"name": "glycerol"}).liquid, of(mass_fraction=1.0).liquid
@@ -315,25 +419,45 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(in_folde
     del tables["contact"]["friction"]
     (in_folder / "mine.toml").write_text(to_toml(tables))
     case = load_case("mine.toml")
-    friction, density = (origins(case)[key] for key in ("contact.friction.bead_wall", "beads.density"))
+    friction, density = (
+        origins(case)[key] for key in ("contact.friction.bead_wall", "beads.density")
+    )
     assert (case.beads.density, case.contact.friction.bead_wall) == (2450.0, 0.21)
     assert (density.origin, density.source) == ("own library", "library.toml, weighed")
     assert (friction.range, friction.guessed) == ((0.18, 0.24), False)
-    assert origins(load_case("fig1b", {"beads.material": "my beads"}))["beads.density"].origin == "own library"
+    assert (
+        origins(load_case("fig1b", {"beads.material": "my beads"}))["beads.density"].origin
+        == "own library"
+    )
     # Of a contact with a material of one's own.
-    roughness = origins(load_case("fig1b", {"boundary.material": "my plate"}))["contact.roughness.bead_wall"]
-    assert (roughness.text, roughness.origin, "by a profiler" in roughness.source) == ("44.7 nm", "own library", True)
-    assert summarise(case)["beads"]["stiffness_ratio"] == pytest.approx(0.02)  # 50 MPa instead of its 2.5 GPa
+    roughness = origins(load_case("fig1b", {"boundary.material": "my plate"}))[
+        "contact.roughness.bead_wall"
+    ]
+    assert (roughness.text, roughness.origin, "by a profiler" in roughness.source) == (
+        "44.7 nm",
+        "own library",
+        True,
+    )
+    assert summarise(case)["beads"]["stiffness_ratio"] == pytest.approx(
+        0.02
+    )  # 50 MPa instead of its 2.5 GPa
     assert "Young's modulus of the beads reduced by a factor of 50\n" in describe(summarise(case))
     # What it took goes along: into case.json, sweeps, spreads and their archives.
     varied = spread_sweep(case, 2)
     assert "contact.friction.bead_wall" in varied.keys
-    sweep = expand({"case": "mine.toml", "axes": {"dimers.replicates": [1, 2]}}, source="s", name="s", folder=in_folder)
+    sweep = expand(
+        {"case": "mine.toml", "axes": {"dimers.replicates": [1, 2]}},
+        source="s",
+        name="s",
+        folder=in_folder,
+    )
     (in_folder / "library.toml").rename("other.toml")
     again = build_case(stored_case(case.as_dict()).document, name="mine")
     assert (again, again.determinants()) == (case, case.determinants())
     spread = expand(varied.file, source="s", name="s", base=(varied.case_name, varied.base))
-    assert {point.beads.density for points in (sweep, spread) for point in points.cases()} == {2450.0}
+    assert {point.beads.density for points in (sweep, spread) for point in points.cases()} == {
+        2450.0
+    }
     with pytest.raises(InputError, match=r'beads\.material = "my beads": not in the library'):
         load_case("mine.toml")
     assert "my beads  " not in call("library", check=True).stdout
@@ -345,7 +469,10 @@ def test_a_pair_of_surfaces_is_found_in_either_order(materials: list[str]) -> No
     library = tomllib.loads(OWN)
     library["surface_pairs"][0]["materials"] = materials
     for bead, wall in (("my beads", "glass"), ("glass", "my beads")):
-        tables = {**document(beads={"material": bead}, boundary={"material": wall}), "library": library}
+        tables = {
+            **document(beads={"material": bead}, boundary={"material": wall}),
+            "library": library,
+        }
         del tables["contact"]["friction"]
         assert build_case(tables, name="pair").contact.friction.bead_wall == 0.21
 
@@ -359,7 +486,9 @@ def test_ranges_of_roughness_end_where_a_case_is_refused() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(shipped("case")))
-def test_beads_of_shipped_cases_are_light_and_small_enough_for_bridges_without_gravity(name: str) -> None:
+def test_beads_of_shipped_cases_are_light_and_small_enough_for_bridges_without_gravity(
+    name: str,
+) -> None:
     assert gravity_warnings(load_case(name)) == []
 
 
@@ -370,7 +499,9 @@ def test_beads_beyond_the_capillary_length_that_the_liquid_does_not_hold_are_rep
     assert "R = 3 mm exceed the capillary length of the liquid, 1.5 mm" in length
     mass = 4.0e3 * 4.0 / 3.0 * pi * 3e-3**3
     pull = 4.0 * pi * 19.2e-3 * 3e-3  # of a perfectly wetted bead on a plane, at most
-    assert float(weight.partition("weigh ")[2].split()[0]) == pytest.approx(mass * 9.81 / pull, rel=0.1)
+    assert float(weight.partition("weigh ")[2].split()[0]) == pytest.approx(
+        mass * 9.81 / pull, rel=0.1
+    )
     assert gravity_warnings(changed_case(case, {"environment.gravity": "0 m/s^2"})) == []
 
 

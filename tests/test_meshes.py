@@ -51,7 +51,9 @@ def vessel_of_file(path: Path) -> Vessel:
 
 def vessel_of_arrays(vessel: Vessel) -> Vessel:
     """What becomes of a surface in m as if it were in a file."""
-    return vessel_of({"points": vessel.points.tolist(), "triangles": vessel.triangles.tolist()}, 1.0)
+    return vessel_of(
+        {"points": vessel.points.tolist(), "triangles": vessel.triangles.tolist()}, 1.0
+    )
 
 
 def revolved(profile: list[tuple[float, float]], sides: int = 24) -> Vessel:
@@ -77,7 +79,9 @@ def turned(vessel: Vessel, axis: str, angle: float = 90.0) -> Vessel:
 def solid_cup(inner: float, floor: float, lip: float | None = None) -> Vessel:
     """A cup as a solid of 10 mm radius and 20 mm height: inner radius, thickness of the floor, radius at the rim; m."""
     at_rim = inner if lip is None else lip
-    return revolved([(0.0, 0.0), (10e-3, 0.0), (10e-3, 20e-3), (at_rim, 20e-3), (inner, floor), (0.0, floor)])
+    return revolved(
+        [(0.0, 0.0), (10e-3, 0.0), (10e-3, 20e-3), (at_rim, 20e-3), (inner, floor), (0.0, floor)]
+    )
 
 
 # --- reading ----------------------------------------------------------------------------------------------------------
@@ -121,7 +125,9 @@ VTP = """<VTKFile type="PolyData" version="0.1"><PolyData><Piece NumberOfPoints=
 </Piece></PolyData></VTKFile>"""
 PLY = """ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y
 property float z\nelement face 12\nproperty list uchar int vertex_indices\nend_header\n"""
-FAR = "\n".join([*(f"v 50000{x} {y} 0.5" for x in range(3) for y in range(3)), "f 1 2 4", "f 2 4 5", "f 3 4 5"])
+FAR = "\n".join(
+    [*(f"v 50000{x} {y} 0.5" for x in range(3) for y in range(3)), "f 1 2 4", "f 2 4 5", "f 3 4 5"]
+)
 FAR_STL = "\n".join(
     [
         "solid far",
@@ -135,13 +141,22 @@ FAR_STL = "\n".join(
 )
 UNREADABLE = {
     "words.obj": ("v a b c", "Failed to parse 0th vertex value at L.1"),
-    "nan.obj": ("v nan 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3", "point 1 is (nan, 0, 0), which is no place"),
-    "beyond.obj": ("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 9", "a polygon has the corner 9, but there are 3 points"),
+    "nan.obj": (
+        "v nan 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3",
+        "point 1 is (nan, 0, 0), which is no place",
+    ),
+    "beyond.obj": (
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 9",
+        "a polygon has the corner 9, but there are 3 points",
+    ),
     "far.obj": (FAR, "too far for 7 digits; move the mesh to the origin"),
     "far.stl": (FAR_STL, "too far for 7 digits; move the mesh to the origin"),
     "empty.stl": ("", "Premature EOF while reading header"),
     "empty.obj": ("", "it has no points"),
-    "short.off": ("OFF\n8 6 0\n0 0 0\n", "it announces 8 points and 6 faces, and has 1 lines of them"),
+    "short.off": (
+        "OFF\n8 6 0\n0 0 0\n",
+        "it announces 8 points and 6 faces, and has 1 lines of them",
+    ),
     "crashing.ply": (PLY, "The result is out of range"),
     "large.vtp": (VTP, "it announces NumberOfPoints = 40000000000; at most 3,000,000 are read"),
     "elsewhere.xdmf": (XDMF, 'its data are in another file (Format="Binary")'),
@@ -153,10 +168,14 @@ UNREADABLE = {
 
 
 @pytest.mark.parametrize("name", UNREADABLE)
-def test_the_reason_of_the_reader_is_told(tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_reason_of_the_reader_is_told(
+    tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]
+) -> None:
     contents, reason = UNREADABLE[name]
     (tmp_path / name).write_text(contents)
-    with pytest.raises(ValueError, match=r"cannot be read: .*; expected the surface of a vessel as STL") as refusal:
+    with pytest.raises(
+        ValueError, match=r"cannot be read: .*; expected the surface of a vessel as STL"
+    ) as refusal:
         read_mesh(tmp_path / name)
     assert reason in str(refusal.value)
     assert capfd.readouterr() == ("", "")
@@ -168,7 +187,9 @@ def test_files_of_any_size_and_pipes_are_not_opened(tmp_path: Path) -> None:
         read_mesh(tmp_path / "pipe.stl")
     with (tmp_path / "large.stl").open("wb") as file:
         file.truncate(MOST_BYTES + 1)
-    with pytest.raises(ValueError, match="has 67 MB; expected at most 67 MB, 20000 triangles: decimate"):
+    with pytest.raises(
+        ValueError, match="has 67 MB; expected at most 67 MB, 20000 triangles: decimate"
+    ):
         read_mesh(tmp_path / "large.stl")
 
 
@@ -181,10 +202,18 @@ def test_the_inner_skin_of_a_solid_is_the_vessel() -> None:
     np.testing.assert_allclose(np.ptp(vessel.points, axis=0), [8e-3, 8e-3, 17e-3], rtol=1e-12)
     assert vessel.height == pytest.approx(17e-3)
     assert vessel.volume() == pytest.approx(8e-3**2 * 17e-3)
-    assert sorted(facet.name for facet in vessel.facets if facet.kind == "face") == ["+x", "+y", "-x", "-y", "floor"]
+    assert sorted(facet.name for facet in vessel.facets if facet.kind == "face") == [
+        "+x",
+        "+y",
+        "-x",
+        "-y",
+        "floor",
+    ]
 
 
-@pytest.mark.parametrize(("inner", "floor", "lip"), [(9e-3, 1e-3, None), (5e-3, 2e-3, None), (9e-3, 2e-3, 3e-3)])
+@pytest.mark.parametrize(
+    ("inner", "floor", "lip"), [(9e-3, 1e-3, None), (5e-3, 2e-3, None), (9e-3, 2e-3, 3e-3)]
+)
 def test_the_inner_skin_of_round_cups(inner: float, floor: float, lip: float | None) -> None:
     """Of thin and thick walls, and of a jar whose mouth is narrower than its body."""
     vessel = vessel_of_arrays(solid_cup(inner, floor, lip))
@@ -206,7 +235,15 @@ def test_the_inner_skin_ends_at_the_lowest_point_of_an_oblique_rim() -> None:
 
 def v_blender() -> Vessel:
     """A closed V of two arms, 10 mm deep along y."""
-    outline = [(-9e-3, 12e-3), (-1e-3, 0.0), (1e-3, 0.0), (9e-3, 12e-3), (4e-3, 12e-3), (0.0, 6e-3), (-4e-3, 12e-3)]
+    outline = [
+        (-9e-3, 12e-3),
+        (-1e-3, 0.0),
+        (1e-3, 0.0),
+        (9e-3, 12e-3),
+        (4e-3, 12e-3),
+        (0.0, 6e-3),
+        (-4e-3, 12e-3),
+    ]
     count = len(outline)
     points = np.array([(x, y, z) for y in (-5e-3, 5e-3) for x, z in outline])
     end = [(0, 1, 6), (1, 5, 6), (1, 2, 5), (2, 3, 5), (3, 4, 5)]
@@ -217,7 +254,9 @@ def v_blender() -> Vessel:
 
 
 ROOMS = {
-    "a drum that lies": turned(revolved([(0.0, 0.0), (8e-3, 0.0), (8e-3, 12e-3), (0.0, 12e-3)]), "x"),
+    "a drum that lies": turned(
+        revolved([(0.0, 0.0), (8e-3, 0.0), (8e-3, 12e-3), (0.0, 12e-3)]), "x"
+    ),
     "an hourglass": revolved([(0.0, 0.0), (8e-3, 0.0), (3e-3, 9e-3), (8e-3, 18e-3), (0.0, 18e-3)]),
     "a V-blender": v_blender(),
     "a can with a dished lid": revolved([(0.0, 0.0), (8e-3, 0.0), (8e-3, 12e-3), (0.0, 11e-3)]),
@@ -235,8 +274,14 @@ def test_closed_rooms_are_vessels(name: str) -> None:
 
 SOLIDS: dict[str, tuple[Vessel, str]] = {
     "lies along y": (turned(solid_cup(9e-3, 2e-3), "x"), "is a solid whose inside opens toward -y"),
-    "lies along x": (turned(solid_cup(5e-3, 2e-3), "y"), r"is a solid whose inside opens toward \+x"),
-    "is upside down": (turned(solid_cup(9e-3, 2e-3), "x", 180.0), "is a solid whose inside opens toward -z"),
+    "lies along x": (
+        turned(solid_cup(5e-3, 2e-3), "y"),
+        r"is a solid whose inside opens toward \+x",
+    ),
+    "is upside down": (
+        turned(solid_cup(9e-3, 2e-3), "x", 180.0),
+        "is a solid whose inside opens toward -z",
+    ),
     "is a tube": (
         revolved([(8e-3, 0.0), (10e-3, 0.0), (10e-3, 20e-3), (8e-3, 20e-3), (8e-3, 0.0)]),
         "is closed, and 36 % of its convex hull",
@@ -295,7 +340,9 @@ def test_beads_are_poured_into_a_jar_above_its_opening_alone(tmp_path: Path) -> 
 
 def test_a_vessel_without_room_for_a_bead_says_so(tmp_path: Path) -> None:
     closed = write(tmp_path, cuboid(np.zeros(3), np.array([8e-3, 8e-3, 1e-3]), -1.0))
-    with pytest.raises(InputError, match=r"no place to pour a bead of 1.\d+ mm from, .* open at its top") as refusal:
+    with pytest.raises(
+        InputError, match=r"no place to pour a bead of 1.\d+ mm from, .* open at its top"
+    ) as refusal:
         build_case(poured(mesh=closed, scale="1 mm"))
     assert "at most 0" not in str(refusal.value)
 
@@ -321,7 +368,9 @@ def test_a_fan_of_thousands_of_triangles_is_a_cone() -> None:
     [((-1e-3, -1e-3, 1e-3), (1e-3, 1e-3, 4e-3)), ((1e-3, -1.1e-4, 3e-3), (4e-3, 2.3e-4, 4e-3))],
     ids=["around the axis", "through the wall"],
 )
-def test_a_body_that_crosses_a_fan_is_found(low: tuple[float, ...], high: tuple[float, ...]) -> None:
+def test_a_body_that_crosses_a_fan_is_found(
+    low: tuple[float, ...], high: tuple[float, ...]
+) -> None:
     fan, body = cone(300), cuboid(np.array(low), np.array(high))
     points = np.concatenate([fan.points, body.points])
     both = Vessel(points, np.concatenate([fan.triangles, len(fan.points) + body.triangles]))
@@ -335,7 +384,9 @@ def test_a_flap_that_is_folded_back_is_found() -> None:
     points = np.concatenate([box.points, [[0.0, -2e-3, 2e-3]]])
     at_rim = np.flatnonzero(points[:, 2] > 3e-3)
     left, right = [k for k in at_rim if points[k, 1] < 0.0]
-    flapped = np.concatenate([box.triangles, [[left, right, len(points) - 1]], [[right, left, len(points) - 1]]])
+    flapped = np.concatenate(
+        [box.triangles, [[left, right, len(points) - 1]], [[right, left, len(points) - 1]]]
+    )
     with pytest.raises(InputError, match=r"overlap in a plane|triangles at an edge"):
         vessel_of_arrays(Vessel(points, flapped[:-1]))
 
@@ -358,7 +409,10 @@ def dish(radius: float) -> Vessel:
     across = np.linspace(-5e-3, 5e-3, 33)
     x, y = (axis.ravel() for axis in np.meshgrid(across, across))
     number = np.arange(len(x)).reshape(33, 33)
-    a, b, c, d = (each.ravel() for each in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]))
+    a, b, c, d = (
+        each.ravel()
+        for each in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1])
+    )
     triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     return Vessel(np.stack([x, y, radius - np.sqrt(radius**2 - x**2 - y**2)], axis=1), triangles)
 
@@ -379,7 +433,11 @@ def test_a_plane_of_many_triangles_of_single_precision_is_one_face() -> None:
 def test_a_bead_slides_over_a_seam_of_strips(tmp_path: Path) -> None:
     """Three strips that turn by 0.9 mrad: it stays on them, and is not thrown up by a step of micrometres."""
     case = {
-        "boundary": {"mesh": str(DATA / "floor-strips-0.9mrad.stl"), "scale": "1 mm", "material": "polystyrene"},
+        "boundary": {
+            "mesh": str(DATA / "floor-strips-0.9mrad.stl"),
+            "scale": "1 mm",
+            "material": "polystyrene",
+        },
         "beads": {"material": "glass"},
         "placed": [{"radius": "0.5 mm", "at": ["3 mm", "0 mm", "0.508 mm"]}],
         "liquid": {"name": "glycerol 87 %", "volume_fraction": 1e-4, "viscosity_ratio": 0.0},
@@ -402,7 +460,11 @@ def test_walls_are_named_by_their_side() -> None:
     hexagon = names_of_faces([(-cos(k * pi / 3.0), -sin(k * pi / 3.0), 0.0) for k in range(6)])
     assert hexagon == ["+x", "60°", "120°", "-x", "240°", "300°"]
     slope = (-sin(pi / 6.0), 0.0, cos(pi / 6.0))
-    assert names_of_faces([(0.0, 0.0, 1.0), slope, (0.0, 0.0, -1.0)], floor=True) == ["floor", "+x slope 30°", "lid"]
+    assert names_of_faces([(0.0, 0.0, 1.0), slope, (0.0, 0.0, -1.0)], floor=True) == [
+        "floor",
+        "+x slope 30°",
+        "lid",
+    ]
 
 
 def test_walls_of_one_side_are_told_apart_by_their_height() -> None:
@@ -436,7 +498,10 @@ def test_show_tells_opening_height_and_volume(tmp_path: Path) -> None:
     assert solid == f"vessel     5 planes (the mesh has 28 triangles), {opened}"
     closed = write(tmp_path, cuboid(np.zeros(3), np.array([10e-3, 10e-3, 20e-3]), -1.0))
     told = text_of({"mesh": closed, "scale": "1 mm"})
-    assert told == "vessel     6 planes, closed: beads are within this surface, 20 mm high, 2 cm³ inside"
+    assert (
+        told
+        == "vessel     6 planes, closed: beads are within this surface, 20 mm high, 2 cm³ inside"
+    )
 
 
 def test_a_run_at_more_facets_takes_longer(tmp_path: Path) -> None:
@@ -460,7 +525,9 @@ def test_layers_of_a_wide_vessel_are_made_when_beads_need_them() -> None:
             return super().side_clearance(places)
 
     boundary = case.boundary
-    counted = Counting(boundary.width, boundary.height, boundary.planes, boundary.points, boundary.triangles)
+    counted = Counting(
+        boundary.width, boundary.height, boundary.planes, boundary.points, boundary.triangles
+    )
     next(iter(counted.layers(0.6e-3, 0.0)))
     assert sum(map(len, made)) < 10_000
 
@@ -470,6 +537,8 @@ def test_beads_that_leave_a_vessel_are_not_called_walkers(tmp_path: Path) -> Non
     tables = poured(mesh=low, scale="1 mm")
     tables["drive"] = {"axis": "z", "frequency": "80 Hz", "peak_acceleration": "200 g"}
     tables["run"] = {"duration": "0.2 s", "longest_settling": "0.05 s"}
-    with pytest.raises((failures.BeadsLost, failures.BeadsOverTheTop), match="left the vessel over its rim") as loss:
+    with pytest.raises(
+        (failures.BeadsLost, failures.BeadsOverTheTop), match="left the vessel over its rim"
+    ) as loss:
         walkers.run(build_case(tables), tmp_path)
     assert "walkers" not in str(loss.value).replace(str(tmp_path), "")

@@ -32,18 +32,24 @@ def _match(pattern: str, file: str) -> str:
         ("^license: (.*)", "CITATION.cff", LICENCE_OF_PYTHON),
     ],
 )
-def test_name_version_and_licence_are_the_same_everywhere(pattern: str, file: str, expected: str) -> None:
+def test_name_version_and_licence_are_the_same_everywhere(
+    pattern: str, file: str, expected: str
+) -> None:
     assert _match(pattern, file) == expected
 
 
 def test_a_container_has_the_version_of_the_package() -> None:
     command = _match(r"version=\$\((.*)\)", "Dockerfile")
-    printed = subprocess.run(command, shell=True, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    printed = subprocess.run(
+        command, shell=True, cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
     assert printed == f"{VERSION}\n"
 
 
 def test_both_papers_name_the_same_authors() -> None:
-    assert _match("^  - name: (.*)", "docs/joss/paper.md") == _match("^  - name: (.*)", "CITATION.cff")
+    assert _match("^  - name: (.*)", "docs/joss/paper.md") == _match(
+        "^  - name: (.*)", "CITATION.cff"
+    )
 
 
 def test_the_site_is_built_with_the_packages_of_the_makefile() -> None:

@@ -36,11 +36,19 @@ CELLS = {
 def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
     """The folder of a JupyterLab, and its address."""
     folder = tmp_path_factory.mktemp("laboratory")
-    options = ["--allow-root", "--no-browser", "--port=0", "--IdentityProvider.token=", "--LabApp.news_url=None"]
+    options = [
+        "--allow-root",
+        "--no-browser",
+        "--port=0",
+        "--IdentityProvider.token=",
+        "--LabApp.news_url=None",
+    ]
     places = {f"JUPYTER_{name}_DIR": str(folder / name) for name in ("CONFIG", "DATA", "RUNTIME")}
     command = [sys.executable, "-m", "jupyterlab", *options, f"--ServerApp.root_dir={folder}"]
     with (folder / "log").open("w") as log:
-        server = subprocess.Popen(command, cwd=folder, env=os.environ | places, stdout=log, stderr=log)
+        server = subprocess.Popen(
+            command, cwd=folder, env=os.environ | places, stdout=log, stderr=log
+        )
     record = wait_for(lambda: next(folder.glob("RUNTIME/jpserver-*.json"), None))
     yield folder, wait_for(lambda: record.read_text().endswith("}") and read_json(record)["url"])
     server.terminate()
@@ -98,7 +106,9 @@ def test_notebooks_run_in_jupyterlab_and_show_tables_figures_and_beads(
     cells.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3"}
     nbformat.write(cells, folder / "cells.ipynb")
 
-    page = browser.new_page(viewport={"width": 1000, "height": 6000})  # cells out of sight are not drawn
+    page = browser.new_page(
+        viewport={"width": 1000, "height": 6000}
+    )  # cells out of sight are not drawn
     run_all(page, address, folder / f"{EXAMPLE.stem}.ipynb")
     assert page.locator(".jp-OutputArea img").count() == 1
     assert len(run_all(page, address, folder / "cells.ipynb")) > 1

@@ -37,10 +37,16 @@ pytestmark = pytest.mark.filterwarnings("ignore::walkers.inputs.bridge_laws.Exec
 
 
 def surfaces(
-    radius: float = 1.0, other: float = inf, volume: float = 0.02, angle: float = 0.0, closest: float = 1e-3
+    radius: float = 1.0,
+    other: float = inf,
+    volume: float = 0.02,
+    angle: float = 0.0,
+    closest: float = 1e-3,
 ) -> Surfaces:
     """Of viscosity and surface tension 1."""
-    liquid = BridgeLiquid(surface_tension=1.0, viscosity=1.0, volume_fraction=0.01, contact_angle=angle)
+    liquid = BridgeLiquid(
+        surface_tension=1.0, viscosity=1.0, volume_fraction=0.01, contact_angle=angle
+    )
     return Surfaces(radius, other, volume, liquid, closest)
 
 
@@ -60,13 +66,25 @@ def cap(radius: float, foot: float) -> tuple[float, float, float]:
 @pytest.mark.parametrize(
     ("radius", "slope", "force", "pressure"),
     [
-        pytest.param(lambda z: 0.5 * cosh(2.0 * z), lambda z: sinh(2.0 * z), pi, 0.0, id="catenoid"),
+        pytest.param(
+            lambda z: 0.5 * cosh(2.0 * z), lambda z: sinh(2.0 * z), pi, 0.0, id="catenoid"
+        ),
         pytest.param(lambda z: 0.5, lambda z: 0.0, 0.5 * pi, 2.0, id="cylinder"),
-        pytest.param(lambda z: (0.36 - z * z) ** 0.5, lambda z: -z / (0.36 - z * z) ** 0.5, 0.0, 1 / 0.3, id="sphere"),
+        pytest.param(
+            lambda z: (0.36 - z * z) ** 0.5,
+            lambda z: -z / (0.36 - z * z) ** 0.5,
+            0.0,
+            1 / 0.3,
+            id="sphere",
+        ),
     ],
 )
 def test_special_surfaces(
-    radius_2: float, radius: Callable[[float], float], slope: Callable[[float], float], force: float, pressure: float
+    radius_2: float,
+    radius: Callable[[float], float],
+    slope: Callable[[float], float],
+    force: float,
+    pressure: float,
 ) -> None:
     """Orr, Scriven and Rivas (1975), doi 10.1017/S0022112075000572: no pressure, no curvature along z, and no force."""
     low, high = -0.25, 0.28
@@ -91,15 +109,21 @@ def test_published_solutions() -> None:
     solved = force_curve(1.0, 1.0, 0.22317611410950786, 0.0, [0.1])
     assert solved.bridges[0, 2] == pytest.approx(-1.0, rel=2e-3)
     assert solved.forces[0] == pytest.approx(3.97627790531559322, rel=2e-3)
-    liquid = BridgeLiquid(surface_tension=20.6e-3, viscosity=1e-3, volume_fraction=0.01, contact_angle=0.0)
+    liquid = BridgeLiquid(
+        surface_tension=20.6e-3, viscosity=1e-3, volume_fraction=0.01, contact_angle=0.0
+    )
     pair = Surfaces(2.381e-3, 2.381e-3, 74.2e-12, liquid, 1e-5)
     gaps = 1e-3 * np.array([0.0, 0.1, 0.2, 0.4])
-    assert 1e6 * by_name("soulie")(pair).forces(gaps).pull == pytest.approx([270.0, 136.0, 71.1, 24.7], rel=4e-3)
+    assert 1e6 * by_name("soulie")(pair).forces(gaps).pull == pytest.approx(
+        [270.0, 136.0, 71.1, 24.7], rel=4e-3
+    )
 
 
 @pytest.mark.parametrize("volume", [1e-3, 1e-2, 1e-1])
 @pytest.mark.parametrize(("degrees", "tolerance"), [(0, 0.006), (20, 0.045), (40, 0.03)])
-def test_published_fits_between_equal_spheres(volume: float, degrees: float, tolerance: float) -> None:
+def test_published_fits_between_equal_spheres(
+    volume: float, degrees: float, tolerance: float
+) -> None:
     """Of rupture: Willett et al. (2000), Eq. 15, doi 10.1021/la000657y; Lian et al. (1993), doi 10.1006/jcis.1993.1452.
 
     Their factor 1 + θ/2 is some 4 % too large at 20°, and Lian's lacks a term in the volume. Of the pull: the fit
@@ -134,7 +158,9 @@ def test_rupture_is_the_end_of_the_branch(given: tuple[float, float, float, Any]
 # --- pulls by name ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("given", [(1.0, inf, 0.0873, 0.7), (1.0, 0.5, 1e-3, 0.2), (1.0, inf, 1e-6, 0.0)])
+@pytest.mark.parametrize(
+    "given", [(1.0, inf, 0.0873, 0.7), (1.0, 0.5, 1e-3, 0.2), (1.0, inf, 1e-6, 0.0)]
+)
 def test_the_polynomial_is_the_equation(given: tuple[float, float, float, float]) -> None:
     curve = young_laplace.law(surfaces(*given))
     gaps = curve.rupture * np.array([0.0, 1e-4, 0.01, 0.3, 0.7, 0.97, 0.9999, 1.0])
@@ -153,14 +179,19 @@ def test_rabinovichs_pull_at_contact() -> None:
 def test_the_stock_engines_law_of_soulie(other: float) -> None:
     """By hand for V = 0.01, θ = 0.3: A = -12.63, B = 0.4927, C = 0.0697; at a plane that of equal spheres, twice."""
     gaps = np.array([-0.1, 0.0, 0.004, 0.03, 0.2])
-    curve, reduced = by_name("soulie")(surfaces(1.0, other, 0.01, 0.3, 0.01)), 1.0 if other == inf else 1.0 / 3.0
+    curve, reduced = (
+        by_name("soulie")(surfaces(1.0, other, 0.01, 0.3, 0.01)),
+        1.0 if other == inf else 1.0 / 3.0,
+    )
     found = curve.forces(gaps)
     assert curve.rupture == rupture_of_lian(0.01, 0.3) == pytest.approx(1.15 * 0.01 ** (1.0 / 3.0))
     pull = np.exp(-12.630 * np.maximum(gaps, 0.0) + 0.49273) + 0.069711
     assert found.pull == pytest.approx(pi * (2.0 if other == inf else sqrt(0.5)) * pull, rel=1e-4)
     near = np.maximum(0.01, gaps) / reduced
     assert found.normal == pytest.approx(6.0 * pi * reduced / near)
-    assert found.sliding == pytest.approx(6.0 * pi * reduced * (8.0 / 15.0 * np.log(1.0 / near) + 0.9588))
+    assert found.sliding == pytest.approx(
+        6.0 * pi * reduced * (8.0 / 15.0 * np.log(1.0 / near) + 0.9588)
+    )
     assert not np.any([found.coupling, found.rolling])
 
 
@@ -169,7 +200,9 @@ def test_pulls_are_proportional_to_tension_and_resistances_to_viscosity(name: st
     """Decks scale their tables by the latter."""
     liquid = replace(surfaces().liquid, contact_angle=0.3)
     tense, thick = replace(liquid, surface_tension=2.0), replace(liquid, viscosity=2.0)
-    once, tenser, thicker = (by_name(name)(replace(surfaces(), liquid=one)) for one in (liquid, tense, thick))
+    once, tenser, thicker = (
+        by_name(name)(replace(surfaces(), liquid=one)) for one in (liquid, tense, thick)
+    )
     gaps = once.rupture * np.array([0.0, 0.01, 0.3, 0.9])
     np.testing.assert_allclose(tenser.forces(gaps).pull, 2.0 * once.forces(gaps).pull, rtol=1e-9)
     np.testing.assert_allclose(thicker.forces(gaps).pull, once.forces(gaps).pull, rtol=1e-9)
@@ -185,7 +218,9 @@ def test_what_was_solved_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
     def pull(volume: float) -> float:
         young_laplace._solved.cache_clear()
-        return float(young_laplace.law(surfaces(2.0, volume=8.0 * volume)).forces(np.zeros(1)).pull[0])
+        return float(
+            young_laplace.law(surfaces(2.0, volume=8.0 * volume)).forces(np.zeros(1)).pull[0]
+        )
 
     first = pull(0.0123)
     (kept,) = folder.iterdir()
@@ -237,8 +272,12 @@ def test_rough_surfaces_resist_as_smooth_ones_farther_apart(other: float) -> Non
         gaps = np.array([-1e-3, 0.0, 1e-4, 0.02])
         normal, *others = reynolds.resistances(rough, gaps)
         apart = np.maximum(gaps, 0.0) + 3e-4
-        np.testing.assert_allclose(others, reynolds.resistances(smooth(rough), apart)[1:], rtol=1e-12)
-        np.testing.assert_allclose(normal, reynolds.resistances(smooth(rough), apart + cavity)[0], rtol=1e-12)
+        np.testing.assert_allclose(
+            others, reynolds.resistances(smooth(rough), apart)[1:], rtol=1e-12
+        )
+        np.testing.assert_allclose(
+            normal, reynolds.resistances(smooth(rough), apart + cavity)[0], rtol=1e-12
+        )
         reduced = 1.0 if other == inf else 1.0 / 3.0
         much = reynolds.resistances(replace(rough, volume=1e9), np.zeros(1))[0]
         assert much == pytest.approx(6.0 * pi * reduced**2 / (3e-4 + cavity), rel=1e-3)
@@ -251,7 +290,11 @@ def test_menisci_of_one_radius_have_one_suction(other: float, meniscus: float) -
     """The bridge in contact has the pressure -γ/r; a small one the volume 4πR*r² (toroid: two radii of curvature)."""
     for angle in (0.2, 0.4):
         liquid = BridgeLiquid(
-            surface_tension=0.02, viscosity=1.0, volume_fraction=0.0, contact_angle=angle, meniscus_radius=meniscus
+            surface_tension=0.02,
+            viscosity=1.0,
+            volume_fraction=0.0,
+            contact_angle=angle,
+            meniscus_radius=meniscus,
         )
         given = Surfaces.of(0.3e-3, other, liquid, Roughness(bead_bead=1e-8, bead_wall=1e-8))
         solved = force_curve(given.radius, given.other_radius, given.volume, angle, [0.0])
@@ -270,7 +313,8 @@ def test_the_modulus_of_auto_ends_at_51_gpa() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "modulus"), [("fig1b", 50e6), ("fig4a", 200e6), ("fig4b", 800e6), ("climber", 3.2e9), ("pile-ci", 50e6)]
+    ("name", "modulus"),
+    [("fig1b", 50e6), ("fig4a", 200e6), ("fig4b", 800e6), ("climber", 3.2e9), ("pile-ci", 50e6)],
 )
 def test_contacts_are_as_stiff_as_their_bridges_ask_for(name: str, modulus: float) -> None:
     """Walkers: ωN/k of the largest bead at the wall is below 0.025, and not at a quarter of the modulus."""
@@ -284,8 +328,17 @@ def test_contacts_are_as_stiff_as_their_bridges_ask_for(name: str, modulus: floa
             force = bridge_at_rest(softened, radius, inf).pull + weight
             overlap = (0.75 * force / (reduced * sqrt(radius))) ** (2.0 / 3.0)
             rate = case.liquid.of_bridges.viscosity * 6.0 * pi * radius**2
-            closest = case.contact.roughness.bead_wall + 2.0 * case.liquid.surface_tension / 101_325.0
-            phase = 2.0 * pi * case.drive.frequency * rate / closest / (2.0 * reduced * sqrt(radius * overlap))
+            closest = (
+                case.contact.roughness.bead_wall + 2.0 * case.liquid.surface_tension / 101_325.0
+            )
+            phase = (
+                2.0
+                * pi
+                * case.drive.frequency
+                * rate
+                / closest
+                / (2.0 * reduced * sqrt(radius * overlap))
+            )
             assert (phase > 0.025) is late
             assert delay(softened, case.walkers[0]) == pytest.approx(phase, rel=1e-9)
 
@@ -294,7 +347,9 @@ def test_limits_at_a_plane() -> None:
     """Goldman, Cox and Brenner (1967): a sphere that translates, one that rotates, and reciprocity."""
     s, c, q = logarithms(surfaces(closest=0.0))
     torque = 8.0 * pi / 10.0  # of translation; force of rotation
-    assert (s, s + c, s + 2.0 * c + q) == pytest.approx((6.0 * pi * 8.0 / 15.0, torque, 8.0 * pi * 2.0 / 5.0), rel=1e-6)
+    assert (s, s + c, s + 2.0 * c + q) == pytest.approx(
+        (6.0 * pi * 8.0 / 15.0, torque, 8.0 * pi * 2.0 / 5.0), rel=1e-6
+    )
 
 
 @pytest.mark.parametrize("ratio", [1.0, 2.0, 5.0])
@@ -330,7 +385,9 @@ def test_resistances_vanish_with_the_bridge() -> None:
     gaps = np.array([0.1, 0.2])
     y = 1e-9 / (2.0 * pi * gaps**2)
     expected = (6.0 * pi / gaps * y**2, 2.0 * pi * y, -0.5 * pi * y**3, pi * y**3)
-    np.testing.assert_allclose(reynolds.resistances(smooth(surfaces(volume=1e-9)), gaps), expected, rtol=1e-3)
+    np.testing.assert_allclose(
+        reynolds.resistances(smooth(surfaces(volume=1e-9)), gaps), expected, rtol=1e-3
+    )
 
 
 # --- laws of users ----------------------------------------------------------------------------------------------------
@@ -345,7 +402,11 @@ def test_the_documented_laws(tmp_path: Path) -> None:
     page = Path("docs/how-to/bridge-law.md").read_text("utf-8")
     for name, text in re.findall(r'```python\n"""(\w+)\.py(.*?)```', page, re.DOTALL):
         (tmp_path / f"{name}.py").write_text(f'"""{name}.py{text}')
-        changes = {"liquid.law": f"{tmp_path}/{name}.py:law", "run.cycles": 4, "run.samples_per_cycle": 2}
+        changes = {
+            "liquid.law": f"{tmp_path}/{name}.py:law",
+            "run.cycles": 4,
+            "run.samples_per_cycle": 2,
+        }
         assert isfinite(run_case(load_case("fig1b", changes), tmp_path).result["velocity"])
     for degrees in (0, 20, 40):
         given = surfaces(1.0, 1.0, volume=0.01, angle=radians(degrees))
@@ -364,19 +425,27 @@ def test_the_documented_laws(tmp_path: Path) -> None:
 
 def test_a_law_is_executed_when_it_is_new_and_the_program_says_so_once(in_folder: Path) -> None:
     (in_folder / "own.py").write_text(f"{OWN}\nopen('executed', 'a').write('x')\n")
-    done = call("run", "fig1b", "--set", "liquid.law=own.py:law", "--set", "run.cycles=4", check=True)
-    assert done.stderr.count(f"executes {in_folder.resolve()}/own.py, the bridge law of the case") == 1
+    done = call(
+        "run", "fig1b", "--set", "liquid.law=own.py:law", "--set", "run.cycles=4", check=True
+    )
+    assert (
+        done.stderr.count(f"executes {in_folder.resolve()}/own.py, the bridge law of the case") == 1
+    )
     assert (in_folder / "executed").read_text() == "x"
 
 
-def test_an_edited_law_has_other_loads_in_the_same_session(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_edited_law_has_other_loads_in_the_same_session(
+    in_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Also if it is as long and as old as before, by which Python tells whether its bytecode is current."""
     monkeypatch.setattr(sys, "dont_write_bytecode", False)
     file, pulls = in_folder / "own.py", []
     for pull in ("4e-5", "8e-5"):
         file.write_text(OWN.replace("4e-5", pull))
         os.utime(file, (1e9, 1e9))
-        pulls.append(bridge_at_rest(load_case("fig1b", {"liquid.law": "own.py:law"}), 3e-4, inf).pull)
+        pulls.append(
+            bridge_at_rest(load_case("fig1b", {"liquid.law": "own.py:law"}), 3e-4, inf).pull
+        )
     assert pulls == [4e-5, 8e-5]
     assert [*in_folder.iterdir()] == [file]
 
@@ -415,11 +484,17 @@ def test_viscous_limit_rules_in_glycerol() -> None:
         ({"shape": "channel", "width": "0.62 mm"}, 1.0),
     ],
 )
-def test_the_viscous_limit_counts_the_walls_that_a_bead_touches_at_once(boundary: dict[str, str], walls: float) -> None:
+def test_the_viscous_limit_counts_the_walls_that_a_bead_touches_at_once(
+    boundary: dict[str, str], walls: float
+) -> None:
     """Two walls damp a bead by c (n n + m m), whose largest eigenvalue is c (1 + |n·m|)."""
 
     def rate(**changes: str) -> float:
-        case = make_case(dimers={"radii": ["0.3 mm", "0.3 mm"]}, liquid={"name": "glycerol 87 %"}, boundary=changes)
+        case = make_case(
+            dimers={"radii": ["0.3 mm", "0.3 mm"]},
+            liquid={"name": "glycerol 87 %"},
+            boundary=changes,
+        )
         found = summarise(case)["time_step"]["limits"]["viscous"]
         assert case.run.time_step == pytest.approx(0.4 * found, rel=0.02)
         return float(2.0 / found)
@@ -434,9 +509,17 @@ def test_the_viscous_limit_counts_the_walls_that_a_bead_touches_at_once(boundary
 @pytest.mark.parametrize("law", LAWS)
 def test_the_viscous_limit_is_of_no_less_than_bridges_resist(law: str) -> None:
     """2/Σ(c/m) of a bead beside its equal: m is its own mass at the wall, half of it between them."""
-    case = make_case(dimers={"radii": ["0.3 mm", "0.3 mm"]}, liquid={"law": law, "volume_fraction": 0.1})
-    mass, given = 4.0 / 3.0 * pi * 3e-4**3 * case.beads.density, (case.liquid.of_bridges, case.contact.roughness)
-    wall, pair = (by_name(law)(Surfaces.of(3e-4, other, *given)).forces(np.zeros(1)).normal[0] for other in (inf, 3e-4))
+    case = make_case(
+        dimers={"radii": ["0.3 mm", "0.3 mm"]}, liquid={"law": law, "volume_fraction": 0.1}
+    )
+    mass, given = (
+        4.0 / 3.0 * pi * 3e-4**3 * case.beads.density,
+        (case.liquid.of_bridges, case.contact.roughness),
+    )
+    wall, pair = (
+        by_name(law)(Surfaces.of(3e-4, other, *given)).forces(np.zeros(1)).normal[0]
+        for other in (inf, 3e-4)
+    )
     share = 0.5 * limits_of(case).viscous * (wall + 2.0 * pair) / mass
     assert 0.9 < share < 1.0 + 1e-9
 

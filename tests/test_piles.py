@@ -15,7 +15,12 @@ from walkers.errors import InputError
 from walkers.files import read_json
 from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case, shipped
-from walkers.inputs.resolving.loads import bridge_at_rest, delay_of, delay_of_loose_beads, softness_warning
+from walkers.inputs.resolving.loads import (
+    bridge_at_rest,
+    delay_of,
+    delay_of_loose_beads,
+    softness_warning,
+)
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.motion import FLOOR, read_bridges, read_motion
@@ -44,7 +49,9 @@ def small(**changes: dict[str, Any]) -> Case:
 def placed(*beads: tuple[float, float, float], **changes: dict[str, Any]) -> Case:
     """Beads of a radius at x and z, mm, in the box of the shipped cluster."""
     tables = document("cluster", **changes)
-    tables["placed"] = [{"radius": f"{r} mm", "at": [f"{x} mm", "0 mm", f"{z} mm"]} for r, x, z in beads]
+    tables["placed"] = [
+        {"radius": f"{r} mm", "at": [f"{x} mm", "0 mm", f"{z} mm"]} for r, x, z in beads
+    ]
     return build_case(tables, name="cluster")
 
 
@@ -73,7 +80,9 @@ def test_bridges_and_tables_are_of_the_beads(pile_run: Path) -> None:
     assert len(frames) == len(motion.time) == len(bed)
     bridges, position, radius = frames[-1], motion.position[-1], motion.radius
     apart = np.linalg.norm(position[bridges.beads[:, 0]] - position[bridges.beads[:, 1]], axis=1)
-    np.testing.assert_allclose(bridges.gap[: len(apart)], apart - radius[bridges.beads].sum(axis=1), atol=1e-9)
+    np.testing.assert_allclose(
+        bridges.gap[: len(apart)], apart - radius[bridges.beads].sum(axis=1), atol=1e-9
+    )
     beads, walls = bridges.at_walls
     on_floor = beads[walls == FLOOR]
     assert len(on_floor) == len(set(on_floor.tolist())) > 3
@@ -86,7 +95,9 @@ def test_bridges_and_tables_are_of_the_beads(pile_run: Path) -> None:
     late = bed[bed["time"] >= bed["time"][bed["time"] >= 0.0].mean()]
     assert rest["bridges"] == pytest.approx(2.0 * len(frames[rest.name].beads) / len(radius))
     for name in ("contacts", "bridges"):
-        assert [result[f"{name}_at_rest"], result[f"{name}_shaken"]] == pytest.approx([rest[name], late[name].mean()])
+        assert [result[f"{name}_at_rest"], result[f"{name}_shaken"]] == pytest.approx(
+            [rest[name], late[name].mean()]
+        )
 
 
 def test_numbers_at_the_start_are_those_of_the_first_frame_of_the_drive(pile_run: Path) -> None:
@@ -124,12 +135,18 @@ def test_a_container_holds_its_beads(shape: str, walls: int, tmp_path: Path) -> 
     case = small(boundary={"shape": shape, "width": "5 mm"}, run=run)
     motion = walkers.run(case, tmp_path).motion
     driven = motion.driven.position
-    room = case.boundary.geometry.side_clearance(driven.reshape(-1, 3)).reshape(driven.shape[:2]) - motion.radius
+    room = (
+        case.boundary.geometry.side_clearance(driven.reshape(-1, 3)).reshape(driven.shape[:2])
+        - motion.radius
+    )
     assert -1e-5 < room.min() < 0.05 * 2.5e-3
     assert driven[..., :2].std() > 0.2 * 2.5e-3
     held = [bridges.at_walls[0, bridges.at_walls[1] != FLOOR] for bridges in read_bridges(motion)]
     assert sum(map(len, held)) >= 2
-    assert all(set(bridges.at_walls[1].tolist()) <= set(range(1 + walls)) for bridges in read_bridges(motion))
+    assert all(
+        set(bridges.at_walls[1].tolist()) <= set(range(1 + walls))
+        for bridges in read_bridges(motion)
+    )
     assert shape == "octagon" or all(len(beads) == len(set(beads.tolist())) for beads in held)
 
 
@@ -146,8 +163,12 @@ def test_all_walls_of_a_trough_are_side_walls(tmp_path: Path) -> None:
 
 def test_a_climber_that_leaves_the_container_ends_the_run(tmp_path: Path) -> None:
     """It climbs at 8.6 mm/s; its upper bead is 3.2 mm below where the walls end; segments are of 0.05 s."""
-    beads = [(radius, 2.5001 - radius, height) for radius, height in ((0.545, 2.0), (0.3075, 1.18135))]
-    case = placed(*beads, boundary={"height": "2.6 mm"}, run={"duration": "1 s", "segment": "0.05 s"})
+    beads = [
+        (radius, 2.5001 - radius, height) for radius, height in ((0.545, 2.0), (0.3075, 1.18135))
+    ]
+    case = placed(
+        *beads, boundary={"height": "2.6 mm"}, run={"duration": "1 s", "segment": "0.05 s"}
+    )
     finished = walkers.run(case, tmp_path)
     assert finished.result["driven"] == pytest.approx(3.2e-3 / 8.63e-3, abs=0.1)
     assert "over its walls" in read_json(finished.directory / MANIFEST_NAME)["ended"]
@@ -155,20 +176,33 @@ def test_a_climber_that_leaves_the_container_ends_the_run(tmp_path: Path) -> Non
     assert call("check", "files", str(finished.directory)).returncode == 0
 
 
-def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tmp_path: Path) -> None:
+def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(
+    tmp_path: Path,
+) -> None:
     """The same dimer as that of `tests.test_bodies`, by the other way: a box, the pile's recording, clusters, climbs.
 
     It is as soft as that one; hard beads climb at 8.2 mm/s.
     On the wall across from it is a dimer led by its small bead.
     """
     radii = ((1, (0.545, 0.3075)), (-1, (0.3075, 0.545)))
-    beads = [(r, side * (2.5001 - r), z) for side, pair in radii for r, z in zip(pair, (8.0, 7.18135), strict=True)]
-    finished = walkers.run(placed(*beads, run={"duration": "0.5 s"}, contact={"youngs_modulus": "50 MPa"}), tmp_path)
+    beads = [
+        (r, side * (2.5001 - r), z)
+        for side, pair in radii
+        for r, z in zip(pair, (8.0, 7.18135), strict=True)
+    ]
+    finished = walkers.run(
+        placed(*beads, run={"duration": "0.5 s"}, contact={"youngs_modulus": "50 MPa"}), tmp_path
+    )
     assert finished.result["climbs"] == 1
     clusters = finished.table("clusters")
     (climb,) = clusters[clusters["climbed"]].to_dict("records")
     assert climb["speed"] * 1e3 == pytest.approx(8.63, rel=0.03)
-    assert (climb["size"], climb["large"], climb["leader_large"], climb["wall_names"]) == (2, 1, True, "+x")
+    assert (climb["size"], climb["large"], climb["leader_large"], climb["wall_names"]) == (
+        2,
+        1,
+        True,
+        "+x",
+    )
     assert climb["begin"] == pytest.approx(0.0, abs=0.05)
     assert finished.motion.position[-1, 2:, 2].max() < 7e-3
 
@@ -176,11 +210,20 @@ def test_a_placed_dimer_climbs_like_the_climber_and_falls_the_other_way_round(tm
 @pytest.mark.parametrize(("mixed_by", "counts"), [("mass", (80, 10)), ("number", (45, 45))])
 def test_a_share_is_of_what_a_mixture_is_mixed_by(mixed_by: str, counts: tuple[int, int]) -> None:
     """Beads of twice the radius have eight times the volume, and the mass; the share is a half, of 90 beads."""
-    case = small(mixture={"small": ["0.25 mm"] * 2, "large": ["0.5 mm"] * 2, "mixed_by": mixed_by, "count": 90})
+    case = small(
+        mixture={
+            "small": ["0.25 mm"] * 2,
+            "large": ["0.5 mm"] * 2,
+            "mixed_by": mixed_by,
+            "count": 90,
+        }
+    )
     assert case.mixture is not None
     assert case.mixture.counts == counts
     by_height = small(mixture={"count": None, "fill_height": "2 mm"}).mixture
-    assert 60 <= sum(by_height.counts) <= 90  # a packing fraction of 0.55, with beads of 0.24 mm³ in the mean
+    assert (
+        60 <= sum(by_height.counts) <= 90
+    )  # a packing fraction of 0.55, with beads of 0.24 mm³ in the mean
 
 
 def test_the_engine_counts_the_steps_of_a_rest_too() -> None:
@@ -188,14 +231,18 @@ def test_the_engine_counts_the_steps_of_a_rest_too() -> None:
     run = {"duration": "4000 s", "time_step": "2 us", "longest_settling": "100 s"}
     fits = small(run=run).run
     assert 3900.0 < fits.steps * fits.time_step < 4001.0
-    with pytest.raises(InputError, match=r"run\.duration.*expected at most \d+ s: the engine counts steps"):
+    with pytest.raises(
+        InputError, match=r"run\.duration.*expected at most \d+ s: the engine counts steps"
+    ):
         small(run={**run, "longest_settling": "300 s"})
 
 
 def test_placed_beads_reach_the_side_of_a_cylinder() -> None:
     boundary = {"boundary": {"shape": "cylinder"}}
     radii = [0.545, 0.3075, 0.3075]
-    case = placed(*((radius, 0.0, 8.0 - 2.0 * number) for number, radius in enumerate(radii)), **boundary)
+    case = placed(
+        *((radius, 0.0, 8.0 - 2.0 * number) for number, radius in enumerate(radii)), **boundary
+    )
     assert [radius > case.border for radius in case.all_radii] == [True, False, False]
     placed((0.545, 2.5 - 0.545 - 1e-3, 8.0), **boundary)
     with pytest.raises(InputError, match="within the boundary"):
@@ -209,10 +256,15 @@ def test_placed_beads_reach_the_side_of_a_cylinder() -> None:
         ({"mixture.small_share": 1}, ["no large beads"]),
         ({"mixture.small_share": 0}, ["no small beads"]),
         ({"run.until": "auto"}, [r"climbers faster than 7\.[67] mm/s"]),
-        ({"run.time_step": "4 us"}, [r"the time step is 2\.4 times the largest of auto \(0\.4 of the viscous"]),
+        (
+            {"run.time_step": "4 us"},
+            [r"the time step is 2\.4 times the largest of auto \(0\.4 of the viscous"],
+        ),
     ],
 )
-def test_what_is_said_of_a_pile_before_it_is_shaken(changes: dict[str, Any], told: list[str]) -> None:
+def test_what_is_said_of_a_pile_before_it_is_shaken(
+    changes: dict[str, Any], told: list[str]
+) -> None:
     """(2 · 40 mm - 41 µL/(0.55 (5.3 mm)²))/10 s is 7.7 mm/s."""
     found = notes(load_case("pile-small", changes))
     assert len(found) == len(told)
@@ -239,18 +291,24 @@ def test_the_program_on_piles(pile_run: Path, in_folder: Path) -> None:
         return call(*command, check=True).stdout.strip()
 
     run, motion = str(pile_run), read_motion(pile_run)
-    assert re.search(r"\n  beads +60\n(.*\n)*  bridges per bead to others, at rest ", told("run", run))
+    assert re.search(
+        r"\n  beads +60\n(.*\n)*  bridges per bead to others, at rest ", told("run", run)
+    )
     assert told("plot", run, "--to", "here") == "here/climb.png"
     assert spoilt(figures_of(read(pile_run))["climb"]) == []
     assert told("render", run, "--to", "here/box.png", "--images", "2") == "here/box.png"
     picture = pv.read(in_folder / "here" / "box.png")
     across, up, _ = picture.dimensions
     edges = picture.point_data.active_scalars.reshape(up, across, -1)[..., :3]
-    assert all((edge == 255).all() for edge in (edges[0], edges[-1], edges[:, 0], edges[:, -1]))  # nothing is cut
+    assert all(
+        (edge == 255).all() for edge in (edges[0], edges[-1], edges[:, 0], edges[:, -1])
+    )  # nothing is cut
     reader = pv.get_reader(told("export", run, "--to", "vtk", "--every", "4", "-o", "here/vtk"))
     driven = np.flatnonzero(motion.time >= 0.0)[::4]
     np.testing.assert_allclose(reader.time_values, motion.time[driven], atol=1e-12)
-    beads, bridges, box = (pv.read(f"here/vtk/{name}_{driven[1]:06d}.vtu") for name in ("beads", "bridges", "boundary"))
+    beads, bridges, box = (
+        pv.read(f"here/vtk/{name}_{driven[1]:06d}.vtu") for name in ("beads", "bridges", "boundary")
+    )
     np.testing.assert_allclose(beads.points, motion.position[driven[1]], rtol=1e-6, atol=1e-9)
     assert set(np.unique(beads["is_climber"])) <= {0, 1}
     assert bridges.n_cells > 50
@@ -260,32 +318,51 @@ def test_the_program_on_piles(pile_run: Path, in_folder: Path) -> None:
 
 def test_a_pile_ends_with_the_segment_of_its_first_climb(tmp_path: Path) -> None:
     """Silicone oil climbs early; without ``until`` the same start is shaken for the whole time."""
-    changes = {"liquid.name": "Si AK5", "run.seed": 3, "run.segment": "0.1 s", "run.duration": "0.8 s"}
+    changes = {
+        "liquid.name": "Si AK5",
+        "run.seed": 3,
+        "run.segment": "0.1 s",
+        "run.duration": "0.8 s",
+    }
     whole = walkers.run(load_case("pile-ci", changes), tmp_path)
     ended = walkers.run(load_case("pile-ci", {**changes, "run.until": "climb"}), tmp_path)
     assert whole.result["driven"] == pytest.approx(0.8, abs=0.02)
     onset = ended.result["onset"]
     assert onset == whole.result["onset"]
     assert onset < ended.result["driven"] < 0.7
-    assert read_json(ended.directory / MANIFEST_NAME)["ended"] == "a cluster has climbed (run.until)"
+    assert (
+        read_json(ended.directory / MANIFEST_NAME)["ended"] == "a cluster has climbed (run.until)"
+    )
     assert not ended.result.warnings or "climbers left" not in " ".join(ended.result.warnings)
 
 
 @pytest.mark.parametrize(
     ("liquid", "modulus"),
-    [("water", 5e7), ("Si AK5", 2e8), ("ethylene glycol", 2e8), ("glycerol 87 %", 3.2e9), ("glycerol", 5.12e10)],
+    [
+        ("water", 5e7),
+        ("Si AK5", 2e8),
+        ("ethylene glycol", 2e8),
+        ("glycerol 87 %", 3.2e9),
+        ("glycerol", 5.12e10),
+    ],
 )
-def test_placed_beads_are_softened_less_in_more_viscous_liquids(liquid: str, modulus: float) -> None:
+def test_placed_beads_are_softened_less_in_more_viscous_liquids(
+    liquid: str, modulus: float
+) -> None:
     """The lowest modulus at which bridges delay no contact by more than 0.025 rad; 51.2 GPa at most."""
     case = load_case("cluster", {"liquid.name": liquid})
     assert case.contact.youngs_modulus == modulus
     assert delay_of(case) < (0.025 if liquid != "glycerol" else 0.05)
     if modulus > 5e7:
-        softer = load_case("cluster", {"liquid.name": liquid, "contact.youngs_modulus": f"{modulus / 4} Pa"})
+        softer = load_case(
+            "cluster", {"liquid.name": liquid, "contact.youngs_modulus": f"{modulus / 4} Pa"}
+        )
         assert delay_of(softer) > 0.025
 
 
-def test_the_delay_of_loose_beads_is_the_resistance_of_a_bridge_over_the_stiffness_of_its_contact() -> None:
+def test_the_delay_of_loose_beads_is_the_resistance_of_a_bridge_over_the_stiffness_of_its_contact() -> (
+    None
+):
     """2πfN/k of the largest bead at the wall: N = 6πηR²/(σ + h_c), k = 2E*√(Rδ), δ from its bridge's pull."""
     case = load_case("cluster", {"contact.youngs_modulus": "50 MPa"})
     radius, liquid = 0.545e-3, case.liquid.of_bridges
@@ -301,14 +378,18 @@ def test_the_delay_of_loose_beads_is_the_resistance_of_a_bridge_over_the_stiffne
 
 
 def test_a_mixture_is_hardened_as_far_as_its_time_step_stays() -> None:
-    soft, thick = (load_case("pile-small", {"liquid.name": name}) for name in ("glycerol 87 %", "glycerol"))
+    soft, thick = (
+        load_case("pile-small", {"liquid.name": name}) for name in ("glycerol 87 %", "glycerol")
+    )
     assert soft.contact.youngs_modulus == 5e7
     assert thick.contact.youngs_modulus == 1.28e10
     same = load_case("pile-small", {"liquid.name": "glycerol", "contact.youngs_modulus": "50 MPa"})
     assert thick.run.time_step == same.run.time_step
 
 
-@pytest.mark.parametrize(("modulus", "error"), [("50 MPa", "up to 9 %"), ("10 MPa", "up to 12 %"), ("3.2 GPa", None)])
+@pytest.mark.parametrize(
+    ("modulus", "error"), [("50 MPa", "up to 9 %"), ("10 MPa", "up to 12 %"), ("3.2 GPa", None)]
+)
 def test_results_say_how_far_soft_beads_change_speeds(modulus: str, error: str | None) -> None:
     warning = softness_warning(load_case("cluster", {"contact.youngs_modulus": modulus}))
     assert (warning is None) if error is None else (error in str(warning))

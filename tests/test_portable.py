@@ -70,7 +70,9 @@ def test_cube_roots(number: float) -> None:
 def test_linear_systems_need_pivots() -> None:
     matrix = np.array([[0.0, 2.0, 1.0], [1.0, 0.0, 0.0], [3.0, 0.0, 4.0]])
     solution = np.array([5.0, -1.0, 2.0])
-    assert portable.solve_linear(matrix[None], (matrix @ solution)[None])[0] == pytest.approx(solution, rel=1e-15)
+    assert portable.solve_linear(matrix[None], (matrix @ solution)[None])[0] == pytest.approx(
+        solution, rel=1e-15
+    )
 
 
 def test_quadrature_integrates_polynomials_exactly() -> None:
@@ -89,7 +91,9 @@ def test_the_slope_of_the_pressure_is_that_of_the_hypergeometric_function() -> N
 
 
 @pytest.mark.parametrize("curvatures", [(1.0, 0.0), (0.9, 0.5)], ids=["plane", "spheres"])
-def test_derivatives_of_a_bridge_are_those_of_its_residuals(curvatures: tuple[float, float]) -> None:
+def test_derivatives_of_a_bridge_are_those_of_its_residuals(
+    curvatures: tuple[float, float],
+) -> None:
     """Against central differences, for all bridges from contact to rupture (no, convex and concave pressure)."""
     family = _Family(curvatures, (0.3, 0.6))
     bridges = _branch(family)[1]
@@ -118,7 +122,9 @@ print(json.dumps({name: bridge_tables_digest(load_case(name)) for name in sys.ar
 def _digests_of_bits(names: Sequence[str], environment: Mapping[str, str]) -> dict[str, str]:
     """Digests of all bits of the bridge tables of shipped cases, made by a process with this environment."""
     command = [sys.executable, "-W", "ignore", "-c", _DIGESTS, *names]
-    made = subprocess.run(command, env=os.environ | environment, capture_output=True, text=True, check=False)
+    made = subprocess.run(
+        command, env=os.environ | environment, capture_output=True, text=True, check=False
+    )
     assert made.returncode == 0, made.stderr
     digests: dict[str, str] = json.loads(made.stdout)
     return digests
@@ -132,7 +138,9 @@ _WIDEST_VECTORS = [name for name in __cpu_dispatch__ if "512" in name or name ==
     [(__cpu_dispatch__, shipped("case")), (_WIDEST_VECTORS, ["fig1b", "fig4b"])],
     ids=["all vector instructions", "AVX-512"],
 )
-def test_bridge_tables_do_not_depend_on_the_processor(features: list[str], names: list[str], tmp_path: Path) -> None:
+def test_bridge_tables_do_not_depend_on_the_processor(
+    features: list[str], names: list[str], tmp_path: Path
+) -> None:
     """Tables that are made without a cache in a process in which these vector instructions are switched off."""
     switched_off = {
         "NPY_DISABLE_CPU_FEATURES": " ".join(features),
@@ -145,12 +153,18 @@ def test_bridge_tables_do_not_depend_on_the_processor(features: list[str], names
 
 def test_the_processor_would_matter_without_portable_functions() -> None:
     """The switches of the test above reach NumPy: its own powers have other bits without them, on most processors."""
-    script = "import numpy as np; print(np.power(np.linspace(0.1, 9.0, 10_000), 1.7).tobytes().hex())"
+    script = (
+        "import numpy as np; print(np.power(np.linspace(0.1, 9.0, 10_000), 1.7).tobytes().hex())"
+    )
     bits = set()
     for features in ("", " ".join(__cpu_dispatch__)):
         environment = os.environ | {"NPY_DISABLE_CPU_FEATURES": features}
         command = [sys.executable, "-W", "ignore", "-c", script]
-        bits.add(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)
+        bits.add(
+            subprocess.run(
+                command, env=environment, capture_output=True, text=True, check=True
+            ).stdout
+        )
     if len(bits) == 1:
         pytest.skip("this processor has one version of the power function")
 

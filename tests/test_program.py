@@ -52,7 +52,9 @@ from walkers.theory.prediction import predict
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 OPTIONAL: dict[str, list[str]] = PROJECT["optional-dependencies"]
-FOR_USERS = {extra: OPTIONAL[extra] for extra in OPTIONAL if extra not in {"all", "docs", "dev", "notebooks"}}
+FOR_USERS = {
+    extra: OPTIONAL[extra] for extra in OPTIONAL if extra not in {"all", "docs", "dev", "notebooks"}
+}
 VERSION = "0.1.1.dev7+g0123abc"
 OURS = canonicalize_name(PROJECT["name"])
 
@@ -71,13 +73,20 @@ def closure(requirements: Iterable[str]) -> set[str]:
             seen.add((name, extra))
             ours = OPTIONAL.get(extra, ()) if name == OURS else metadata.requires(name) or ()
             further = [Requirement(text) for text in ours]
-            left += [it for it in further if it.marker is None or it.marker.evaluate({"extra": extra})]
+            left += [
+                it for it in further if it.marker is None or it.marker.evaluate({"extra": extra})
+            ]
     return {name for name, _ in seen} - {OURS}
 
 
 def python(*arguments: str, folder: Path, **environment: str) -> str:
     """What Python prints; the project in the folder is built by it."""
-    how: dict[str, Any] = {"cwd": folder, "env": os.environ | environment, "capture_output": True, "text": True}
+    how: dict[str, Any] = {
+        "cwd": folder,
+        "env": os.environ | environment,
+        "capture_output": True,
+        "text": True,
+    }
     done = subprocess.run([sys.executable, *arguments], check=False, **how)
     assert done.returncode == 0, done.stderr
     return str(done.stdout)
@@ -90,12 +99,16 @@ def wheel(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     def build(folder: Path) -> None:
         source = folder / "source"
         for package in ("walkers", "studies"):
-            shutil.copytree(ROOT / package, source / package, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(
+                ROOT / package, source / package, ignore=shutil.ignore_patterns("__pycache__")
+            )
         for name in ("pyproject.toml", "README.md", "LICENSE"):
             shutil.copy(ROOT / name, source)
         build = "import setuptools.build_meta as build; print(build.build_{}('..'))"
         version = "SETUPTOOLS_SCM_PRETEND_VERSION"
-        name = python("-c", build.format("sdist"), folder=source, **{version: VERSION}).splitlines()[-1]
+        name = python(
+            "-c", build.format("sdist"), folder=source, **{version: VERSION}
+        ).splitlines()[-1]
         shutil.unpack_archive(folder / name, folder, filter="data")
         unpacked = folder / name.removesuffix(".tar.gz")
         python("-c", build.format("wheel"), folder=unpacked, **{version: ""})
@@ -111,7 +124,9 @@ def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     (site,) = place.glob("lib/python*/site-packages")
     for name in closure(PROJECT["dependencies"]):
         one = metadata.distribution(name)
-        for part in {file.parts[0] for file in one.files or () if file.parts[0] not in {"..", "__pycache__"}}:
+        for part in {
+            file.parts[0] for file in one.files or () if file.parts[0] not in {"..", "__pycache__"}
+        }:
             if not (site / part).exists():
                 (site / part).symlink_to(Path(str(one.locate_file(part))).resolve())
     shutil.unpack_archive(next(wheel.glob("*.whl")), site, "zip")
@@ -122,8 +137,16 @@ def test_the_wheel_of_the_sdist_holds_all_files_of_the_package(wheel: Path) -> N
     """And nothing else: no study."""
     with zipfile.ZipFile(next(wheel.glob("*.whl"))) as packed:
         held = {one: packed.read(one) for one in packed.namelist() if ".dist-info/" not in one}
-    files = [path for path in (ROOT / "walkers").rglob("*") if path.is_file() and "__pycache__" not in path.parts]
-    assert held == {path.relative_to(ROOT).as_posix(): path.read_bytes() for path in files if path.name[0] != "."}
+    files = [
+        path
+        for path in (ROOT / "walkers").rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    ]
+    assert held == {
+        path.relative_to(ROOT).as_posix(): path.read_bytes()
+        for path in files
+        if path.name[0] != "."
+    }
 
 
 @pytest.mark.slow
@@ -165,7 +188,9 @@ def test_what_needs_an_extra_names_it_before_it_begins(
     run = walkers.load(run_directory(run=SHORT))
     for package in EXTRAS[extra][1]:
         monkeypatch.setitem(sys.modules, module_of(package), None)
-    message = rf"^{EXTRAS[extra][0]} needs [\w, -]+: make extras, or pip install '{OURS}\[{extra}\]'$"
+    message = (
+        rf"^{EXTRAS[extra][0]} needs [\w, -]+: make extras, or pip install '{OURS}\[{extra}\]'$"
+    )
     for use in NEEDING[extra]:
         with pytest.raises(ExtraMissing, match=message):
             use(run, tmp_path)
@@ -178,10 +203,24 @@ def test_every_package_that_is_imported_is_declared() -> None:
         extra: sorted(names_of(requirements)) for extra, requirements in FOR_USERS.items()
     }
     assert Requirement(OPTIONAL["all"][0]).extras == FOR_USERS.keys()
-    declared = names_of([*PROJECT["dependencies"], *(one for given in FOR_USERS.values() for one in given)])
-    modules = {name: {file.parts[0].removesuffix(".py") for file in metadata.files(name) or ()} for name in declared}
-    of_others = {"IPython", "paraview", "pydantic_core", "vtkmodules", "setuptools"}  # of a notebook, of pydantic, …
-    used = {name.partition(".")[0] for name in grimp.build_graph("walkers", include_external_packages=True).modules}
+    declared = names_of(
+        [*PROJECT["dependencies"], *(one for given in FOR_USERS.values() for one in given)]
+    )
+    modules = {
+        name: {file.parts[0].removesuffix(".py") for file in metadata.files(name) or ()}
+        for name in declared
+    }
+    of_others = {
+        "IPython",
+        "paraview",
+        "pydantic_core",
+        "vtkmodules",
+        "setuptools",
+    }  # of a notebook, of pydantic, …
+    used = {
+        name.partition(".")[0]
+        for name in grimp.build_graph("walkers", include_external_packages=True).modules
+    }
     used -= {*sys.stdlib_module_names, "walkers", *of_others}
     assert used - set().union(*modules.values()) == set()
     assert [name for name in declared if not modules[name] & used] == [], "declared and not used"
@@ -197,7 +236,12 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 
 def test_a_fault_that_cannot_be_planted_or_seen_is_named() -> None:
     """Its text has gone, or is there twice; or the tests that are to see it have gone."""
-    sound = {"name": "sound", "file": "tests/conftest.py", "new": "", "tests": ["tests/test_program.py -k planted"]}
+    sound = {
+        "name": "sound",
+        "file": "tests/conftest.py",
+        "new": "",
+        "tests": ["tests/test_program.py -k planted"],
+    }
     sound["old"] = "def brief_pile("
     wrong = {
         "gone": {"old": "def a_function_that_nobody_wrote("},
@@ -223,7 +267,9 @@ def test_two_beads_walk_toward_the_large_one(run_directory: Callable[..., Path])
     assert len(read_table(directory, "trajectory")) == 61
 
 
-def test_from_a_case_file_to_a_deck_and_a_run(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_from_a_case_file_to_a_deck_and_a_run(
+    in_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Progress is plain lines without a terminal. The first one is due after a second; here at once."""
     monkeypatch.setattr("walkers.progress._FIRST_LINE_SECONDS", 0.0)
     (in_folder / "mine.toml").write_text(to_toml(document(run={**SHORT, "cycles": 30})))
@@ -235,7 +281,9 @@ def test_from_a_case_file_to_a_deck_and_a_run(in_folder: Path, monkeypatch: pyte
     assert "velocity along the heading" in done.stdout
     lines = [line for line in done.stderr.splitlines() if not line.startswith("walkers: warning:")]
     assert lines
-    progress = re.compile(r"mine: (starting|\d+ %(, .* left, .*s simulated, .*steps/s)?|measuring)$")
+    progress = re.compile(
+        r"mine: (starting|\d+ %(, .* left, .*s simulated, .*steps/s)?|measuring)$"
+    )
     assert all(map(progress.match, lines)), lines
     assert "(already run)" in call("run", "mine.toml", check=True).stdout
     written = Path(call("export", "--to", "vtk", "mine.toml", check=True).stdout.strip())
@@ -246,20 +294,33 @@ def test_from_a_case_file_to_a_deck_and_a_run(in_folder: Path, monkeypatch: pyte
 def test_a_new_case_runs_and_its_lines_that_are_commented_out_say_what_holds_without_them(
     name: str, in_folder: Path
 ) -> None:
-    assert call("new", "mine", *([] if name == "fig1b" else [name]), check=True).stdout == "mine.toml\n"
+    assert (
+        call("new", "mine", *([] if name == "fig1b" else [name]), check=True).stdout
+        == "mine.toml\n"
+    )
     text = Path("mine.toml").read_text()
     assert text == shipped("case")[name].read_text()
     loose = {"run.duration": "0.05 s", "run.longest_settling": "0 s"}
     short = loose if "duration" in text else {"run.cycles": 12, "run.settling_cycles": 4}
     case = load_case("mine", short)
-    assert "mine: 170 Hz" if case.loose else "mm/s" in call("run", "mine", *settings(short), check=True).stdout
+    assert (
+        "mine: 170 Hz"
+        if case.loose
+        else "mm/s" in call("run", "mine", *settings(short), check=True).stdout
+    )
     table, tried = "", 0
-    for head, key, value in re.findall(r"(?m)^(?:(?:# )?\[+(\w+)\]+.*|# ([\w.]+) *= *(.+?)(?: *#.*)?)$", text):
+    for head, key, value in re.findall(
+        r"(?m)^(?:(?:# )?\[+(\w+)\]+.*|# ([\w.]+) *= *(.+?)(?: *#.*)?)$", text
+    ):
         table = {"clusters": "clusters[0]"}.get(head, head) or table
         if key:
-            with_it = load_case("mine", {f"{table}.{key}": tomllib.loads(f"value = {value}")["value"]})
+            with_it = load_case(
+                "mine", {f"{table}.{key}": tomllib.loads(f"value = {value}")["value"]}
+            )
             said, without = (json.dumps(one.determinants()) for one in (with_it, load_case("mine")))
-            assert re.sub(r"(\.\d{12})\d+", r"\1", said) == re.sub(r"(\.\d{12})\d+", r"\1", without), key
+            assert re.sub(r"(\.\d{12})\d+", r"\1", said) == re.sub(
+                r"(\.\d{12})\d+", r"\1", without
+            ), key
             tried += 1
     assert tried >= 3
 
@@ -281,17 +342,29 @@ def test_every_public_function_of_the_modules_of_commands_is_a_command() -> None
     places = {command.place for command in ALL_COMMANDS}
     for module in {place.partition(":")[0] for place in places}:
         functions = inspect.getmembers(importlib.import_module(module), inspect.isfunction)
-        own = {f"{module}:{name}" for name, function in functions if function.__module__ == module and name[0] != "_"}
-        apps = inspect.getmembers(importlib.import_module(module), lambda value: isinstance(value, App))
-        of_apps = {f"{module}:{name}" for _, app in apps for name in map(str, app) if name[0] != "-"}
-        of_apps |= {f"{module}:{app.default_command.__name__}" for _, app in apps if app.default_command}
+        own = {
+            f"{module}:{name}"
+            for name, function in functions
+            if function.__module__ == module and name[0] != "_"
+        }
+        apps = inspect.getmembers(
+            importlib.import_module(module), lambda value: isinstance(value, App)
+        )
+        of_apps = {
+            f"{module}:{name}" for _, app in apps for name in map(str, app) if name[0] != "-"
+        }
+        of_apps |= {
+            f"{module}:{app.default_command.__name__}" for _, app in apps if app.default_command
+        }
         assert own - of_apps <= places
 
 
 @pytest.mark.parametrize(
     "error",
     [
-        InputErrors([refused("one", "expected another"), unusable("drive.frequency", "expected Hz", 3)]),
+        InputErrors(
+            [refused("one", "expected another"), unusable("drive.frequency", "expected Hz", 3)]
+        ),
         ExtraMissing("report", ["k3d"]),
         EngineFailure("stopped", Path("runs/one"), lost=3),
     ],
@@ -300,7 +373,11 @@ def test_every_public_function_of_the_modules_of_commands_is_a_command() -> None
 def test_errors_come_back_from_another_process(error: WalkersError) -> None:
     """As those of the workers of an executor do."""
     again = pickle.loads(pickle.dumps(error))
-    assert (type(again), str(again), vars(again).keys()) == (type(error), str(error), vars(error).keys())
+    assert (type(again), str(again), vars(again).keys()) == (
+        type(error),
+        str(error),
+        vars(error).keys(),
+    )
 
 
 def test_help_names_every_command() -> None:
@@ -313,18 +390,29 @@ def test_help_names_every_command() -> None:
             for part in app[name]
             if part[0] != "-"
         )
-    done = subprocess.run([sys.executable, "-m", "walkers", "-h"], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "walkers", "-h"], capture_output=True, text=True, check=True
+    )
     assert done.stdout == shown
-    assert call("--version", check=True).stdout.splitlines()[1] == f"LIGGGHTS-PUBLIC 3.8.0, {find_engine().path}"
+    assert (
+        call("--version", check=True).stdout.splitlines()[1]
+        == f"LIGGGHTS-PUBLIC 3.8.0, {find_engine().path}"
+    )
     targets = subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert all(f"make {target}" in targets for target in ("walker", "test", "help", "clean"))
 
 
 SLOW = "cyclopts rich pydantic numpy scipy pandas matplotlib pyarrow pyvista pint"
-PUBLIC = "import walkers.inputs, walkers.api, walkers.postprocess.show.report.run, walkers.sweeps.report"
+PUBLIC = (
+    "import walkers.inputs, walkers.api, walkers.postprocess.show.report.run, walkers.sweeps.report"
+)
 LOADED: dict[str, tuple[str, str, set[str]]] = {
     "help": ("import walkers.main as m; m._status(['--help'])", SLOW, set()),
-    "list": ("import walkers.main as m; m._status(['list'])", SLOW, {"cyclopts", "numpy", "pydantic"}),
+    "list": (
+        "import walkers.main as m; m._status(['list'])",
+        SLOW,
+        {"cyclopts", "numpy", "pydantic"},
+    ),
     "package": (PUBLIC, "inputs runner sweeps IPython", set()),
 }
 """What is done, modules that take long to import, or are others', and those of them that are loaded then."""
@@ -334,9 +422,11 @@ LOADED: dict[str, tuple[str, str, set[str]]] = {
 def test_no_more_is_loaded_than_is_needed(name: str, in_folder: Path) -> None:
     """Others may have a module called inputs or runner, and theirs is theirs. Nothing public needs a notebook."""
     script, modules, expected = LOADED[name]
-    assert {*python("-c", f"{script}; import sys; print(*sys.modules)", folder=in_folder).splitlines()[-1].split()} & {
-        *modules.split()
-    } == expected
+    assert {
+        *python("-c", f"{script}; import sys; print(*sys.modules)", folder=in_folder)
+        .splitlines()[-1]
+        .split()
+    } & {*modules.split()} == expected
 
 
 def test_a_function_gives_what_its_command_prints(looked_through: Path) -> None:
@@ -353,5 +443,9 @@ def test_a_function_gives_what_its_command_prints(looked_through: Path) -> None:
 
 
 def test_the_package_exports_few_names_that_are_documented() -> None:
-    assert dir(walkers) == walkers.__all__ == sorted(walkers.__all__, key=lambda name: (name.islower(), name))
+    assert (
+        dir(walkers)
+        == walkers.__all__
+        == sorted(walkers.__all__, key=lambda name: (name.islower(), name))
+    )
     assert all(getattr(walkers, name).__doc__ for name in walkers.__all__)

@@ -91,7 +91,9 @@ def test_columns_of_other_quantities_are_left_out_with_a_note(tmp_path: Path) ->
     assert case.excitation.record.rows[1][1:] == pytest.approx((G * ROWS[1][1], 0.0, 0.0))
     said = [note for note in notes(case) if "left out" in note]
     names = ': "temperature (degC)", "state", "Gyroscope z (rad/s)"'
-    assert said == [f"drive.record: columns that are no acceleration along x, y or z are left out{names}"]
+    assert said == [
+        f"drive.record: columns that are no acceleration along x, y or z are left out{names}"
+    ]
     shown = call("show", "case.toml", folder=tmp_path, check=True).stdout
     assert f"note       {said[0]}" in shown
     assert "ignored" not in shown
@@ -144,8 +146,12 @@ def test_the_largest_number_of_rows() -> None:
 
 
 # --- offset -----------------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize(("periods", "phase"), [(20.0, 0.0), (20.25, 0.0), (20.5, 0.0), (20.25, pi / 2.0)])
-def test_a_record_that_ends_within_a_period_tilts_no_plate(periods: float, phase: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("periods", "phase"), [(20.0, 0.0), (20.25, 0.0), (20.5, 0.0), (20.25, pi / 2.0)]
+)
+def test_a_record_that_ends_within_a_period_tilts_no_plate(
+    periods: float, phase: float, tmp_path: Path
+) -> None:
     """Walkers of the published drive walk at 1.981 mm/s either way.
 
     If the plain mean of 20.5 periods is taken for the offset, they walk at 1.1 and 2.8 mm/s.
@@ -178,7 +184,9 @@ def test_a_period_that_repeats_keeps_its_plain_mean() -> None:
     """With the weights of a window, a period that begins at its peak would have an offset of half its peak."""
     time = np.linspace(0.0, 1.0 / F, 1001)
     made = record(time, PEAK * np.cos(2.0 * pi * F * time) + 3.0, repeats=True)
-    assert made.course(time, 2)[:, 0] == pytest.approx(PEAK * np.cos(2.0 * pi * F * time), abs=1e-6 * PEAK)
+    assert made.course(time, 2)[:, 0] == pytest.approx(
+        PEAK * np.cos(2.0 * pi * F * time), abs=1e-6 * PEAK
+    )
     assert made.course(0.0, 1) == pytest.approx(made.course(made.length, 1), abs=1e-12)
 
 
@@ -194,14 +202,24 @@ def test_a_record_begins_and_ends_at_no_displacement() -> None:
 @pytest.mark.parametrize(
     ("periods", "slope", "told"),
     [
-        (5.25, 0.0, "only 5 periods of its slowest line: its offset is uncertain by 0.01 g, like a tilt of 0.5"),
+        (
+            5.25,
+            0.0,
+            "only 5 periods of its slowest line: its offset is uncertain by 0.01 g, like a tilt of 0.5",
+        ),
         (20.25, 0.0, None),
-        (80.25, 0.02, "offset of drive.record changes from its first to its second half: the rest acts as 0.005 g"),
+        (
+            80.25,
+            0.02,
+            "offset of drive.record changes from its first to its second half: the rest acts as 0.005 g",
+        ),
         (80.25, -0.02, "like a tilt of 0.29°, first one way, then the other"),
         (80.25, 0.005, None),
     ],
 )
-def test_an_offset_that_acts_as_a_tilt_is_told(periods: float, slope: float, told: str | None, tmp_path: Path) -> None:
+def test_an_offset_that_acts_as_a_tilt_is_told(
+    periods: float, slope: float, told: str | None, tmp_path: Path
+) -> None:
     """In notes before the run, and as a warning of its result; slopes in g per second."""
     time, x = sine_of(periods)
     few = {"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 4}
@@ -217,7 +235,9 @@ def test_an_offset_that_acts_as_a_tilt_is_told(periods: float, slope: float, tol
 # --- length of a run --------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(("length", "cycles"), [({}, 159), ({"duration": "2 s"}, 159), ({"duration": "1.995 s"}, 159),
                                                 ({"duration": "0.5 s"}, 40), ({"cycles": 30}, 30)])  # fmt: skip
-def test_a_whole_record_is_run_by_default(length: dict[str, Any], cycles: int, tmp_path: Path) -> None:
+def test_a_whole_record_is_run_by_default(
+    length: dict[str, Any], cycles: int, tmp_path: Path
+) -> None:
     """Or up to a duration; 2 s are 159.6 cycles of this record."""
     time = np.arange(0.0, 2.0001, 2e-4)
     case = recorded(tmp_path, csv(time, x=4.0 * np.sin(2.0 * pi * 79.8 * time)))
@@ -278,7 +298,9 @@ def test_the_slow_part_of_a_parabola_is_the_parabola() -> None:
     assert slow_part(parabola + fast, 160)[middle] == pytest.approx(parabola[middle], abs=1e-5)
 
 
-@pytest.mark.parametrize(("periods", "share"), [(0.25, 0.0), (1.0, 0.25), (2.0, 1.0), (2.5, 1.0), (4.0, 1.0)])
+@pytest.mark.parametrize(
+    ("periods", "share"), [(0.25, 0.0), (1.0, 0.25), (2.0, 1.0), (2.5, 1.0), (4.0, 1.0)]
+)
 def test_the_slow_part_has_a_stated_limit(periods: float, share: float) -> None:
     """What is left of a motion of some periods in a window of 400 samples."""
     motion = np.sin(2.0 * pi * periods / 400.0 * np.arange(8000))[:, None]
@@ -291,7 +313,10 @@ def test_pictures_do_not_show_the_drift_of_a_sensor(tmp_path: Path) -> None:
     time = np.arange(0.0, 0.5, 2e-4)
     text = csv(time, x=-4.0 * np.sin(2.0 * pi * F * time) + 0.1 * np.sin(2.0 * pi * 3.0 * time))
     for frame in ("container", "lab"):
-        done = run(recorded(tmp_path, text, {"samples_per_cycle": 20, "settling_cycles": 2}, frame=frame), tmp_path)
+        done = run(
+            recorded(tmp_path, text, {"samples_per_cycle": 20, "settling_cycles": 2}, frame=frame),
+            tmp_path,
+        )
         motion = done.motion
         drift = boundary_motion(motion.case.excitation, motion.time)[0]
         assert np.ptp(drift[:, 0]) > 2e-3
@@ -318,9 +343,13 @@ def test_the_direction_is_that_of_the_acceleration() -> None:
 
 
 # --- amplitudes that change -------------------------------------------------------------------------------------------
-@pytest.mark.parametrize("points", [(2.0, 0.2), (0.2, 2.0), (2.0, 2.0, 1.0, 1.0, 0.3, 0.3), (1.5, 0.3, 0.3, 1.5)])
+@pytest.mark.parametrize(
+    "points", [(2.0, 0.2), (0.2, 2.0), (2.0, 2.0, 1.0, 1.0, 0.3, 0.3), (1.5, 0.3, 0.3, 1.5)]
+)
 @pytest.mark.parametrize("other", [0.0, 0.5])
-def test_the_local_amplitude_is_the_envelope_of_the_strongest_line(points: tuple[float, ...], other: float) -> None:
+def test_the_local_amplitude_is_the_envelope_of_the_strongest_line(
+    points: tuple[float, ...], other: float
+) -> None:
     """Beside noise, an offset and other lines, of which one beats with the strongest."""
     envelope = np.interp(TIME, np.linspace(0.0, 2.0, len(points)), points)
     x = envelope * np.sin(2.0 * pi * F * TIME + 0.5)
@@ -352,20 +381,28 @@ def test_beats_are_no_change_of_the_amplitude(second: float) -> None:
 def test_a_record_that_repeats_has_one_amplitude() -> None:
     """That of its strongest line."""
     time = np.linspace(0.0, 4.0 / F, 801)
-    made = record(time, 5.0 * np.sin(4.0 * pi * F * time) + 3.0 * np.sin(6.0 * pi * F * time), repeats=True)
+    made = record(
+        time, 5.0 * np.sin(4.0 * pi * F * time) + 3.0 * np.sin(6.0 * pi * F * time), repeats=True
+    )
     assert made.amplitude_range == pytest.approx((5.0, 5.0), rel=1e-5)
     assert made.is_stationary
 
 
 @pytest.mark.parametrize(("ends", "name"), [((1.2, 0.8), "stops_at"), ((0.8, 1.2), "starts_at")])
-def test_a_record_that_falls_or_rises_is_a_ramp(ends: tuple[float, float], name: str, tmp_path: Path) -> None:
+def test_a_record_that_falls_or_rises_is_a_ramp(
+    ends: tuple[float, float], name: str, tmp_path: Path
+) -> None:
     """Its threshold is that of a sine with a ramp, 0.9 g, within the resolution."""
     time = np.arange(0.0, 0.7, 1e-4)
     envelope = np.interp(time, [0.0, 0.7], ends)
     noise = np.random.default_rng(7).normal(scale=0.01, size=len(time))
-    (tmp_path / "record.csv").write_text(csv(time, x=-envelope * np.sin(2.0 * pi * F * time) + noise + 0.05))
+    (tmp_path / "record.csv").write_text(
+        csv(time, x=-envelope * np.sin(2.0 * pi * F * time) + noise + 0.05)
+    )
     changes = {"dimers.replicates": 1, "run.samples_per_cycle": 1}
-    done = run(load_case("fig1b", {**changes, "drive.record": str(tmp_path / "record.csv")}), tmp_path)
+    done = run(
+        load_case("fig1b", {**changes, "drive.record": str(tmp_path / "record.csv")}), tmp_path
+    )
     within = done.result[name.replace("_at", "_within")]
     assert within == pytest.approx(0.4 * G * 0.1 / 0.7, rel=0.1)
     assert done.result[name] == pytest.approx(0.9 * G, abs=within)
@@ -379,7 +416,9 @@ def test_a_record_that_changes_without_a_threshold_has_a_velocity(tmp_path: Path
     envelope = np.interp(time, [0.0, 0.7], [4.0, 3.4])
     (tmp_path / "record.csv").write_text(csv(time, x=-envelope * np.sin(2.0 * pi * F * time)))
     changes = {"dimers.replicates": 1, "run.samples_per_cycle": 1}
-    done = run(load_case("fig1b", {**changes, "drive.record": str(tmp_path / "record.csv")}), tmp_path)
+    done = run(
+        load_case("fig1b", {**changes, "drive.record": str(tmp_path / "record.csv")}), tmp_path
+    )
     assert "stops_at" not in done.result
     assert done.result.warnings == [
         "the amplitude of the strongest line of the record lies between 3.49 and 3.96 g: "
@@ -419,7 +458,10 @@ def test_a_ramp_beside_a_record_that_changes_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("with_record", [True, False])
 def test_limits_of_accelerations_include_the_ramp(with_record: bool, tmp_path: Path) -> None:
     ramp = [["0 s", 1], ["0.05 s", 1000]]
-    with pytest.raises(InputError, match=r"expected factors that give accelerations up to 10000 m/s²; .* 39[12]\d\d"):
+    with pytest.raises(
+        InputError,
+        match=r"expected factors that give accelerations up to 10000 m/s²; .* 39[12]\d\d",
+    ):
         if with_record:
             time, x = sine_of(20)
             recorded(tmp_path, csv(time, x=x), BRIEF, ramp=ramp)
@@ -430,7 +472,9 @@ def test_limits_of_accelerations_include_the_ramp(with_record: bool, tmp_path: P
 @pytest.mark.parametrize("periods", [1.3, 2.4])
 def test_a_record_of_few_periods_is_refused(periods: float, tmp_path: Path) -> None:
     time, x = sine_of(periods)
-    with pytest.raises(InputError, match="expected at least 3 periods of its strongest line, found"):
+    with pytest.raises(
+        InputError, match="expected at least 3 periods of its strongest line, found"
+    ):
         recorded(tmp_path, csv(time, x=x), {"cycles": 2, "settling_cycles": 0})
 
 
@@ -469,7 +513,9 @@ def test_windows_are_around_their_samples(width: int) -> None:
 
 def test_a_header_behind_a_hash_may_stand_above_decimal_commas(tmp_path: Path) -> None:
     file = tmp_path / "log.csv"
-    rows = [f"{number / 1e3:.4f};{9.81 * (number % 3):.3f}".replace(".", ",") for number in range(20)]
+    rows = [
+        f"{number / 1e3:.4f};{9.81 * (number % 3):.3f}".replace(".", ",") for number in range(20)
+    ]
     file.write_text("\n".join(["# time (s);z (m/s^2)", *rows]) + "\n", encoding="utf-8")
     contents = read_record(file)
     assert len(contents["rows"]) == 20
@@ -488,7 +534,9 @@ def test_the_largest_acceleration_is_that_of_the_spline() -> None:
     """With six rows a period at 30°, 90°, … rows meet the peak of a sine; at 0°, 60°, … they miss it by 13 %."""
     time = np.arange(0.0, 61.0) / 6.0 / F
     sine = 39.2 * np.sin(2.0 * np.pi * F * time)
-    record = Record(rows=tuple((t, a, 0.0, 0.0) for t, a in zip(time.tolist(), sine.tolist(), strict=True)))
+    record = Record(
+        rows=tuple((t, a, 0.0, 0.0) for t, a in zip(time.tolist(), sine.tolist(), strict=True))
+    )
     assert np.abs(sine).max() == pytest.approx(0.866 * 39.2, rel=1e-3)
     assert record.largest(2) == pytest.approx(39.2, rel=0.01)
 

@@ -53,12 +53,18 @@ class Report:
 
     def __init__(self, path: Path) -> None:
         self.text = path.read_text("utf-8")
-        self.carried = dict(re.findall(r'<script type="text/plain" id="([^"]+)">([^<]+)</script>', self.text))
+        self.carried = dict(
+            re.findall(r'<script type="text/plain" id="([^"]+)">([^<]+)</script>', self.text)
+        )
         self.scripts = re.findall(r"<script\b[^>]*>(.*?)</script>", self.text, re.DOTALL)
         bare = re.sub(r"(<(script|style)\b[^>]*>).*?</\2>", r"\1", self.text, flags=re.DOTALL)
         self.title = html.unescape("".join(re.findall(r"<title>(.*?)</title>", bare, re.DOTALL)))
-        self.references = re.findall(r"""\s(?:src|href|srcset|action|data)\s*=\s*["']?([^"'\s>]+)""", bare)
-        self.words = html.unescape(re.sub(r"<title\b.*?</title>|<[^>]*>", "", bare, flags=re.DOTALL))
+        self.references = re.findall(
+            r"""\s(?:src|href|srcset|action|data)\s*=\s*["']?([^"'\s>]+)""", bare
+        )
+        self.words = html.unescape(
+            re.sub(r"<title\b.*?</title>|<[^>]*>", "", bare, flags=re.DOTALL)
+        )
 
 
 @pytest.fixture(scope="session")
@@ -70,13 +76,19 @@ def walked_run(run_directory: Callable[..., Path]) -> Path:
 
 @pytest.fixture(scope="session")
 def walked_report(walked_run: Path, once: Once) -> Path:
-    return once("walked-report", lambda folder: report_run(walked_run, folder / "report.html")) / "report.html"
+    return (
+        once("walked-report", lambda folder: report_run(walked_run, folder / "report.html"))
+        / "report.html"
+    )
 
 
 @pytest.fixture(scope="session")
 def pile_report(pile_run: Path, once: Once) -> Path:
     """Asked for by the run's name in the folder of the runs."""
-    place = once("pile-report", lambda to: walkers.load(pile_run.name, pile_run.parent).report(to / "report.html"))
+    place = once(
+        "pile-report",
+        lambda to: walkers.load(pile_run.name, pile_run.parent).report(to / "report.html"),
+    )
     return place / "report.html"
 
 
@@ -86,7 +98,11 @@ def swept(once: Once) -> Path:
 
     def make(out: Path) -> None:
         (out / "base.toml").write_text(to_toml(document(run={"cycles": 6, "settling_cycles": 2})))
-        given = {"title": HOSTILE, "case": "base.toml", "axes": {"drive.frequency": ["60 Hz", "70 Hz"]}}
+        given = {
+            "title": HOSTILE,
+            "case": "base.toml",
+            "axes": {"drive.frequency": ["60 Hz", "70 Hz"]},
+        }
         run_sweep(expand(given, source="two", name="two", folder=out), out, Options(2))
         sweep = walkers.load("two", out)
         sweep.runs[1].report()
@@ -110,7 +126,11 @@ def test_numbers_of_a_report_are_the_results_with_what_is_not_computed_and_param
     assert f"Uncertainty not computed: {not_computed(results).text}." in page.words
     assert path.stat().st_size < LARGEST
     origins = walkers.load(directory).case.origins
-    for said in ("given", "library", *(told for one in origins for told in (one.key, one.text, one.word))):
+    for said in (
+        "given",
+        "library",
+        *(told for one in origins for told in (one.key, one.text, one.word)),
+    ):
         assert said in page.words
 
 
@@ -137,7 +157,10 @@ def test_a_sweeps_report_has_its_figure_and_table_and_links_to_the_reports_of_it
     swept: Path, swept_report: Path
 ) -> None:
     page, table = Report(swept_report), load(swept)
-    assert all(f'<td class="number">{rounded(1e3 * one, "mm/s")}</td>' in page.text for one in table["velocity"])
+    assert all(
+        f'<td class="number">{rounded(1e3 * one, "mm/s")}</td>' in page.text
+        for one in table["velocity"]
+    )
     assert page.references == [f"../{Path(table['run'][1]).name}/report.html"]
     assert (swept / page.references[0]).is_file()
     assert svg_of(walkers.load(swept).figure()) in page.text
@@ -156,20 +179,28 @@ def test_the_report_of_a_sweep_of_three_keys_draws_the_values_of_the_last_alike_
 def test_a_reports_figures_are_those_that_are_plotted_and_fewer_frames_make_it_smaller(
     walked_run: Path, walked_report: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text, drawings = walked_report.read_text("utf-8"), [svg_of(one) for one in figures_of(read(walked_run)).values()]
+    text, drawings = (
+        walked_report.read_text("utf-8"),
+        [svg_of(one) for one in figures_of(read(walked_run)).values()],
+    )
     assert len(drawings) == 2
     assert all(one in text and "<metadata" not in one and "purl.org" not in one for one in drawings)
     monkeypatch.setattr(
         "walkers.postprocess.show.report.run.MOST_PLACES", 4 * 181
     )  # all at first, and then half of them
-    less = report_run(walked_run, tmp_path / "less.html", largest=walked_report.stat().st_size - 1000)
+    less = report_run(
+        walked_run, tmp_path / "less.html", largest=walked_report.stat().st_size - 1000
+    )
     assert less.stat().st_size < walked_report.stat().st_size - 1000
     assert "frames shown" in Report(less).words
 
 
 def test_the_player_shows_the_motion(walked_run: Path) -> None:
     """Each bead of the first walker is where the motion has it, turned as its spins turned it, to 0.1 µm."""
-    motion, (plot, times, _) = gathered(read_motion(walked_run)).driven, player_of(read_motion(walked_run))
+    motion, (plot, times, _) = (
+        gathered(read_motion(walked_run)).driven,
+        player_of(read_motion(walked_run)),
+    )
     motion = motion.of_walkers(motion.walkers[:1])
     beads = [one for one in plot.objects if one.name.startswith("bead")]
     assert len(beads) == len(motion.radius) == 2
@@ -181,11 +212,15 @@ def test_the_player_shows_the_motion(walked_run: Path) -> None:
         matrices = np.array(list(ball.model_matrix.values()), dtype=float)
         assert [float(time) for time in ball.model_matrix] == pytest.approx(motion.time, abs=1e-6)
         np.testing.assert_allclose(matrices[:, :3, 3], 1e3 * motion.position[:, number], atol=1e-4)
-        turned = Rotation.from_matrix(matrices[[settled, -1], :3, :3] / (1e3 * motion.radius[number]))
+        turned = Rotation.from_matrix(
+            matrices[[settled, -1], :3, :3] / (1e3 * motion.radius[number])
+        )
         way = motion.walkers[0].facing * float((turned[1] * turned[0].inv()).as_rotvec() @ across)
         speed = way * motion.radius[number] / (motion.time[-1] - motion.time[settled])
         assert speed == pytest.approx(rotation[f"rotation_{number + 1}"], rel=0.01, abs=2e-6)
-    weightless = replace(motion, case=motion.case.put("environment.gravity", 0.0))  # is seen as the floor lies
+    weightless = replace(
+        motion, case=motion.case.put("environment.gravity", 0.0)
+    )  # is seen as the floor lies
     assert camera_of(weightless) == camera_of(motion)
 
 
@@ -194,24 +229,42 @@ def test_necks_of_the_player_are_as_wide_as_bridges_at_their_times(pile_run: Pat
     motion, (plot, _, captions) = read_motion(pile_run).driven, player_of(read_motion(pile_run))
     front = [wall.normal[1] > 0.9 for wall in motion.case.boundary.walls].index(True)
     (necks,) = (one for one in plot.objects if one.name == "bridges")
-    held = {bridges.frame: int((bridges.contacts[:, 2] != front).sum()) for bridges in read_bridges(motion)}
+    held = {
+        bridges.frame: int((bridges.contacts[:, 2] != front).sum())
+        for bridges in read_bridges(motion)
+    }
     assert sum(held.values()) < sum(len(bridges.contacts) for bridges in read_bridges(motion))
     points = [necks.vertices[f"{motion.time[frame]:.6f}"].reshape(-1, 80, 3) for frame in held]
     wide = [np.ptp(one[:, :16], axis=1).max(axis=1) > 0.01 for one in points]
     assert [int(each.sum()) for each in wide] == [*held.values()]
     assert any((one & ~other).any() for one, other in pairwise(wide))
     beads = next(one for one in plot.objects if one.name == "beads")
-    np.testing.assert_allclose(beads.positions[f"{motion.time[-1]:.6f}"], 1e3 * motion.position[-1], atol=1e-3)
+    np.testing.assert_allclose(
+        beads.positions[f"{motion.time[-1]:.6f}"], 1e3 * motion.position[-1], atol=1e-3
+    )
     assert any("rolling of the beads is not shown" in caption for caption in captions)
 
 
 def test_words_and_numbers() -> None:
     """Numbers have four digits at most and the decimals of their unit."""
-    given = [(1.38173201,), (1234.5678,), (-87654.3,), (0.0012345678,), (-3.2e-15, "mm/s"), (6,), (nan,)]
+    given = [
+        (1.38173201,),
+        (1234.5678,),
+        (-87654.3,),
+        (0.0012345678,),
+        (-3.2e-15, "mm/s"),
+        (6,),
+        (nan,),
+    ]
     given += [(-0.002164, "mm/s"), (0.000414, "mm/s"), (9.9996, "mm/s")]
     expected = ["1.382", "1235", "-87650", "0.001235", "0", "6", "-", "-0.002", "0", "10"]
     assert [rounded(*one) for one in given] == expected
-    texts = {"m": ("250", "mm"), "m/s": ("250.0", "mm/s"), "rad": ("14.32", "°"), "share": ("25", "%")}
+    texts = {
+        "m": ("250", "mm"),
+        "m/s": ("250.0", "mm/s"),
+        "rad": ("14.32", "°"),
+        "share": ("25", "%"),
+    }
     assert {unit: shown(0.25, unit) for unit in texts} == texts
     aside = make_case().put("boundary.tilt", pi / 3.0).put("boundary.uphill", pi / 2.0)
     assert caption(aside).endswith("plane tilted by 60°, up is at 90° from x toward y")
@@ -225,10 +278,17 @@ MILLISECONDS = 1e3 * PATIENCE
 def browser() -> Iterator[Browser]:
     from playwright.sync_api import expect, sync_playwright
 
-    flags = ["--no-sandbox", "--no-first-run", "--disable-background-networking", "--disable-component-update"]
+    flags = [
+        "--no-sandbox",
+        "--no-first-run",
+        "--disable-background-networking",
+        "--disable-component-update",
+    ]
     flags += ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
     with sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=CHROMIUM, args=flags, timeout=MILLISECONDS)
+        started = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=flags, timeout=MILLISECONDS
+        )
         expect.set_options(timeout=MILLISECONDS)
         yield started
         started.close()
@@ -238,7 +298,9 @@ def browser() -> Iterator[Browser]:
 def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
     """Open a file; what it asked a network for, and what it complained of, is looked at in the end."""
     # A processor draws each pixel: a sixteenth of them.
-    context = browser.new_context(offline=True, viewport={"width": 480, "height": 420}, device_scale_factor=0.25)
+    context = browser.new_context(
+        offline=True, viewport={"width": 480, "height": 420}, device_scale_factor=0.25
+    )
     context.set_default_timeout(MILLISECONDS)
     asked: list[str] = []
     complaints: list[str] = []
@@ -246,7 +308,12 @@ def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
     def opened(path: Path, *, ready: bool = True) -> Page:
         page = context.new_page()
         page.on("request", lambda request: asked.append(request.url))
-        page.on("console", lambda said: complaints.append(said.text) if said.type in {"error", "warning"} else None)
+        page.on(
+            "console",
+            lambda said: (
+                complaints.append(said.text) if said.type in {"error", "warning"} else None
+            ),
+        )
         page.on("pageerror", lambda error: complaints.append(str(error)))
         page.goto(path.as_uri())
         if ready:
@@ -255,10 +322,14 @@ def visit(browser: Browser) -> Iterator[Callable[..., Page]]:
 
     yield opened
     context.close()
-    assert {url.partition("//")[0] for url in asked if not url.startswith(("blob:", "data:"))} == {"file:"}, asked
+    assert {url.partition("//")[0] for url in asked if not url.startswith(("blob:", "data:"))} == {
+        "file:"
+    }, asked
     assert all(url.endswith("report.html") for url in asked if url.startswith("file:"))
     # What the software renderer says of itself is not the page's.
-    assert not [one for one in complaints if "GPU stall" not in one and "swiftshader" not in one.lower()], complaints
+    assert not [
+        one for one in complaints if "GPU stall" not in one and "swiftshader" not in one.lower()
+    ], complaints
 
 
 def picture(page: Page) -> bytes:

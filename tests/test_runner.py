@@ -73,8 +73,16 @@ def test_the_name_depends_on_what_determines_the_run() -> None:
     def name(**changes: object) -> str:
         return run_place(make_case(**changes), find_engine(), Path()).name
 
-    changes: list[dict[str, object]] = [{}, {"run": {"seed": 2}}, {"run": {"cycles": 61}}, {"drive": {"frame": "lab"}}]
-    changes += [{"drive": {"peak_acceleration": "4.01 g"}}, {"contact": {"rolling_friction": 0.001}}]
+    changes: list[dict[str, object]] = [
+        {},
+        {"run": {"seed": 2}},
+        {"run": {"cycles": 61}},
+        {"drive": {"frame": "lab"}},
+    ]
+    changes += [
+        {"drive": {"peak_acceleration": "4.01 g"}},
+        {"contact": {"rolling_friction": 0.001}},
+    ]
     assert len({name(**one) for one in changes}) == len(changes)
     assert name(title="another title") == name()
     other = replace(find_engine(), sha256="0" * 64)
@@ -87,7 +95,13 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     case = make_case(run=SHORT)
     run = run_case(case, tmp_path).directory
     tables = {f"{name}.parquet" for name in ("trajectory", "walkers", "bridges", "cycles")}
-    assert {path.name for path in run.iterdir()} == {"case.json", "manifest.json", "result.json", "segments", *tables}
+    assert {path.name for path in run.iterdir()} == {
+        "case.json",
+        "manifest.json",
+        "result.json",
+        "segments",
+        *tables,
+    }
     dumps = {"beads.bin", "bridges.pairs.txt", "bridges.walls.txt"}
     deck = {"layout.json", "walker.lig", "bridges.txt", "engine.log", "segment.json", "run.sh"}
     assert {path.name for path in (run / FIRST_SEGMENT).iterdir()} == deck | dumps
@@ -97,20 +111,33 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     assert manifest["engine"]["sha256"] == find_engine().sha256
 
 
-def test_a_run_is_found_by_its_directory_its_name_or_its_case_with_other_values_too(in_folder: Path) -> None:
+def test_a_run_is_found_by_its_directory_its_name_or_its_case_with_other_values_too(
+    in_folder: Path,
+) -> None:
     case_file = _toml(in_folder)
-    first, second = (json.loads(call("run", case_file, "--json", check=True).stdout) for _ in range(2))
+    first, second = (
+        json.loads(call("run", case_file, "--json", check=True).stdout) for _ in range(2)
+    )
     assert (first["cached"], second["cached"]) == (False, True)
     assert first["velocity"] == second["velocity"]
     for named in (first["run"], Path(first["run"]).name, case_file):
         assert walkers.load(named).directory == Path(first["run"])
     setting = ("--set", "drive.frequency=70Hz")
-    assert f"first do: walkers run {case_file} --set drive.frequency=70Hz" in call("plot", case_file, *setting).stderr
+    assert (
+        f"first do: walkers run {case_file} --set drive.frequency=70Hz"
+        in call("plot", case_file, *setting).stderr
+    )
     slower = json.loads(call("run", first["run"], *setting, "--json", check=True).stdout)
     for named in (first["run"], Path(first["run"]).name, case_file):
-        assert walkers.load(named, "runs", {"drive.frequency": "70 Hz"}).directory == Path(slower["run"])
+        assert walkers.load(named, "runs", {"drive.frequency": "70 Hz"}).directory == Path(
+            slower["run"]
+        )
         assert json.loads(call("run", named, *setting, "--json", check=True).stdout)["cached"]
-    assert walkers.run(case_file, "runs").directory == walkers.run(first["run"]).directory == Path(first["run"])
+    assert (
+        walkers.run(case_file, "runs").directory
+        == walkers.run(first["run"]).directory
+        == Path(first["run"])
+    )
 
 
 def test_a_run_with_other_values_belongs_beside_the_run(tmp_path: Path) -> None:
@@ -131,7 +158,11 @@ def test_a_running_simulation_is_looked_at_stopped_and_continued(in_folder: Path
     run = walkers.load(next(Path("runs").glob("*.lock")).with_suffix(""))
     assert isinstance(run, walkers.Run)
     wait_for(lambda: run.progress and run.progress.share > 2 / run.case.run.cycles)
-    assert (run.status, walkers.load(case_file).status, len(engines_in(in_folder))) == ("running", "running", 1)
+    assert (run.status, walkers.load(case_file).status, len(engines_in(in_folder))) == (
+        "running",
+        "running",
+        1,
+    )
     assert f"{run.directory}: the run is running: " in call("plot", case_file).stderr
     program.send_signal(signal.SIGINT)
     assert program.wait(PATIENCE) == 130
@@ -177,7 +208,9 @@ def test_a_crash_within_a_replacement_leaves_no_trace(tmp_path: Path) -> None:
     assert not left.exists()
 
 
-def test_a_lock_that_somebody_has_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_lock_that_somebody_has_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(PATIENCE_OF_LOCKS, 0.1)
     with locked([tmp_path / "x"]) as ours, locked([tmp_path / "x", tmp_path / "y"]) as theirs:
         assert (list(ours), list(theirs)) == ([tmp_path / "x"], [tmp_path / "y"])
@@ -221,14 +254,18 @@ def test_engine_missing(tmp_path: Path) -> None:
     assert not (tmp_path / "runs").exists()
 
 
-def test_a_contact_model_that_cannot_be_compiled_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_contact_model_that_cannot_be_compiled_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Without a compiler, and with one that fails; nothing stays in the cache."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "bin").mkdir()
     for program in filter(None, map(shutil.which, ("liggghts", "mpicxx", "ldd", "sh", "bash"))):
         (tmp_path / "bin" / Path(program).name).symlink_to(program)
     monkeypatch.setenv("PATH", str(tmp_path / "bin"))
-    with pytest.raises(failures.ContactModelMissing, match=r"apt-get install g\+\+ libliggghts-dev libopenmpi-dev"):
+    with pytest.raises(
+        failures.ContactModelMissing, match=r"apt-get install g\+\+ libliggghts-dev libopenmpi-dev"
+    ):
         plugin_of(find_engine())
     compiler = tmp_path / "bin" / "g++"
     compiler.write_text("#!/bin/sh\necho 'bridge.cpp:1: error: no such thing' >&2\nexit 1\n")
@@ -247,7 +284,11 @@ UNTRUSTED: dict[str, Callable[[Path], object]] = {
     "without a checksum": lambda model: model.with_suffix(".json").unlink(),
     "a checksum that others can write": lambda model: model.with_suffix(".json").chmod(0o666),
     "compiled from something else": lambda model: model.with_suffix(".json").write_text(
-        re.sub('"compiled_from": "\\w+', f'"compiled_from": "{"0" * 64}', model.with_suffix(".json").read_text())
+        re.sub(
+            '"compiled_from": "\\w+',
+            f'"compiled_from": "{"0" * 64}',
+            model.with_suffix(".json").read_text(),
+        )
     ),
     "in a folder that others can write": lambda model: model.parent.chmod(0o777),
 }
@@ -272,10 +313,16 @@ def test_a_contact_model_that_may_not_be_the_compiled_is_compiled_anew(
     UNTRUSTED[name](model)
     assert plugin_of(find_engine()) == model
     about = model.lstat()
-    assert (model.read_bytes() == right, about.st_mtime_ns != before, about.st_uid) == (True, True, os.geteuid())
+    assert (model.read_bytes() == right, about.st_mtime_ns != before, about.st_uid) == (
+        True,
+        True,
+        os.geteuid(),
+    )
     assert (about.st_mode & 0o022, model.parent.stat().st_mode & 0o022) == (0, 0)
     os.chown(model.parent, 12345, 12345)
-    with pytest.raises(failures.ContactModelMissing, match=r"belongs to another user.*set XDG_CACHE_HOME"):
+    with pytest.raises(
+        failures.ContactModelMissing, match=r"belongs to another user.*set XDG_CACHE_HOME"
+    ):
         plugin_of(find_engine())
 
 
@@ -330,7 +377,9 @@ def _force_at_contact() -> float:
 
 
 @pytest.mark.parametrize("name", PLANTED)
-def test_capillary_forces_that_another_user_wrote_are_not_believed(name: str, empty_cache: Path) -> None:
+def test_capillary_forces_that_another_user_wrote_are_not_believed(
+    name: str, empty_cache: Path
+) -> None:
     """They are computed again, and a cache of the user's own keeps them."""
     force = _force_at_contact()
     assert 9.0 < force < 4.0 * math.pi, "the bridge pulls a little less than 4 π R γ"
@@ -357,24 +406,35 @@ def test_audits_that_another_user_wrote_are_not_believed(name: str, empty_cache:
 def test_an_audit_is_kept_whatever_files_others_of_the_group_may_write(empty_cache: Path) -> None:
     before = os.umask(0o002)
     try:
-        audit.write_audit("engine", {"contact_model": "0", "passed": True, "lines": 1, "failures": [], "date": ""})
+        audit.write_audit(
+            "engine", {"contact_model": "0", "passed": True, "lines": 1, "failures": [], "date": ""}
+        )
     finally:
         os.umask(before)
     assert audit.read_audit("engine", "0") is not None
 
 
-def test_another_version_of_the_forces_is_another_engine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_another_version_of_the_forces_is_another_engine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shutil.copytree(model_sources.SOURCES, tmp_path / "engine")
     monkeypatch.setattr(model_sources, "SOURCES", tmp_path / "engine")
     before, source = find_engine(), tmp_path / "engine" / "bridge.cpp"
     text = source.read_text()
-    for changed, same in ((f"{text}// another line\n", True), (re.sub(r"(FORCES_VERSION) \d+", r"\1 0", text), False)):
+    for changed, same in (
+        (f"{text}// another line\n", True),
+        (re.sub(r"(FORCES_VERSION) \d+", r"\1 0", text), False),
+    ):
         source.write_text(changed)
         assert (find_engine() == before) == same
 
 
 def _half(text: str) -> str:
-    return re.sub(r"(?m)^(run +|variable +cycles string )(\d+)", lambda one: f"{one[1]}{int(one[2]) // 2}", text)
+    return re.sub(
+        r"(?m)^(run +|variable +cycles string )(\d+)",
+        lambda one: f"{one[1]}{int(one[2]) // 2}",
+        text,
+    )
 
 
 def _narrow(text: str) -> str:
@@ -388,9 +448,17 @@ INFINITE = "variable bad equal (step>300)*(1e308*100-1e308*100)\nfix bad all add
 FAST = {"drive": {"peak_acceleration": "8 g"}, "run": {"cycles": 60, "settling_cycles": 2}}
 UNSTABLE = {
     "liquid": {"name": "glycerol 87 %"},
-    "run": {"time_step": "30 us", "allow_unstable": True, "samples_per_cycle": 1, "cycles": 60, "settling_cycles": 2},
+    "run": {
+        "time_step": "30 us",
+        "allow_unstable": True,
+        "samples_per_cycle": 1,
+        "cycles": 60,
+        "settling_cycles": 2,
+    },
 }
-BAD_DECKS: dict[str, tuple[dict[str, object], Callable[[str], str], type[failures.EngineFailure], str]] = {
+BAD_DECKS: dict[
+    str, tuple[dict[str, object], Callable[[str], str], type[failures.EngineFailure], str]
+] = {
     "an error": (
         {"run": SHORT},
         lambda text: re.sub("run  ", "w\udcff\udcfebble  ", text),
@@ -398,7 +466,12 @@ BAD_DECKS: dict[str, tuple[dict[str, object], Callable[[str], str], type[failure
     ),
     "half of the steps": ({"run": SHORT}, _half, failures.MissingFrames, "31 of 61 frames"),
     "beads that are lost": (FAST, _narrow, failures.BeadsLost, "left the simulation box"),
-    "no numbers": ({"run": SHORT}, lambda text: re.sub("fix +motion", INFINITE, text), failures.BlowUp, "not a number"),
+    "no numbers": (
+        {"run": SHORT},
+        lambda text: re.sub("fix +motion", INFINITE, text),
+        failures.BlowUp,
+        "not a number",
+    ),
     "a long one": ({"run": LONG}, str, failures.TimeLimitExceeded, r"0\.6 s"),
 }
 
@@ -422,7 +495,11 @@ STRANGE_ENGINES = {
     ),
     "crashes": ("kill -SEGV $$", failures.EngineKilled, "SIGSEGV"),
     "is killed": ('liggghts "$@" & sleep 0.3; kill -KILL $$', failures.EngineKilled, "SIGKILL"),
-    "cuts a dump": ('liggghts "$@" && truncate -s -5 bridges.pairs.txt', failures.MissingFrames, r"wrote \d+ of"),
+    "cuts a dump": (
+        'liggghts "$@" && truncate -s -5 bridges.pairs.txt',
+        failures.MissingFrames,
+        r"wrote \d+ of",
+    ),
     "ends without a word": ("exit 7", failures.EngineFailure, "exit status 7, without output"),
     "says nothing": (
         "trap '' TERM; while :; do sleep 0.1; done",
@@ -432,8 +509,15 @@ STRANGE_ENGINES = {
         "liggghts -log none -in walker.lig; exec sleep 4711",
         *(failures.EngineSilent, r"step (\d+) of \1;"),
     ),
-    "writes lines without end": ("trap '' TERM; yes | tee -i /dev/null", failures.LogTooLong, "beyond 2 MB"),
-    "ends after too long a log": ('yes | head -c 2100000; exec liggghts "$@"', *(failures.LogTooLong, "beyond 2 MB")),
+    "writes lines without end": (
+        "trap '' TERM; yes | tee -i /dev/null",
+        failures.LogTooLong,
+        "beyond 2 MB",
+    ),
+    "ends after too long a log": (
+        'yes | head -c 2100000; exec liggghts "$@"',
+        *(failures.LogTooLong, "beyond 2 MB"),
+    ),
 }
 
 
@@ -441,9 +525,18 @@ STRANGE_ENGINES = {
 def test_strange_engines_are_ended_and_told(front: Front, tmp_path: Path, name: str) -> None:
     script, kind, told = STRANGE_ENGINES[name]
     # An engine starts within seconds even on a busy machine.
-    bounds = {"silence": {"says nothing": 0.5, "stops saying anything": 4.0}.get(name, 60.0), "log_limit": 2e6}
+    bounds = {
+        "silence": {"says nothing": 0.5, "stops saying anything": 4.0}.get(name, 60.0),
+        "log_limit": 2e6,
+    }
     with pytest.raises(kind, match=told) as failure:
-        _launch(make_case(run=SHORT), tmp_path / "runs", engine=front(script), time_limit=PATIENCE, **bounds)
+        _launch(
+            make_case(run=SHORT),
+            tmp_path / "runs",
+            engine=front(script),
+            time_limit=PATIENCE,
+            **bounds,
+        )
     assert "last line" not in str(failure.value)
     wait_for(lambda: not processes_in(tmp_path))
     assert _reason(tmp_path / "runs") == type(failure.value).__name__
@@ -451,7 +544,9 @@ def test_strange_engines_are_ended_and_told(front: Front, tmp_path: Path, name: 
     assert log.stat().st_size <= 2_000_000
 
 
-def test_a_failed_run_is_remembered_when_the_spread_of_the_next_one_succeeds(in_folder: Path) -> None:
+def test_a_failed_run_is_remembered_when_the_spread_of_the_next_one_succeeds(
+    in_folder: Path,
+) -> None:
     guessed = {"contact": {"restitution": 0.3}, "uncertain": {"contact.restitution": [0.2, 0.4]}}
     (in_folder / "hot.toml").write_text(to_toml(document(**UNSTABLE, **guessed)))
     (in_folder / "good.toml").write_text(to_toml(document(run=SHORT, **guessed)))
@@ -478,9 +573,19 @@ def test_an_engine_that_never_started_is_tried_twice_again(front: Front, tmp_pat
         assert births.read_text().count("born") == 3
 
 
-MPI = ("btl=tcp", "pml=cm", "mtl=no", "rmaps=no", "oob=no", "ess=singleton", "orte_default_hostfile=/none")
+MPI = (
+    "btl=tcp",
+    "pml=cm",
+    "mtl=no",
+    "rmaps=no",
+    "oob=no",
+    "ess=singleton",
+    "orte_default_hostfile=/none",
+)
 SURROUNDINGS = {
-    "settings of Open MPI": {f"OMPI_MCA_{one.partition('=')[0]}": one.partition("=")[2] for one in MPI},
+    "settings of Open MPI": {
+        f"OMPI_MCA_{one.partition('=')[0]}": one.partition("=")[2] for one in MPI
+    },
     "what is not there": {"LD_PRELOAD": "/no/such/library.so", "TMPDIR": "/proc"},
 }
 
@@ -501,13 +606,17 @@ def test_what_a_user_has_set_in_the_environment_does_not_matter(
 def test_lines_of_a_log_are_judged(tmp_path: Path) -> None:
     """A step that is printed twice; a calm line after a failure, read in one look."""
     deck = render_deck(make_case(run=SHORT), whole(make_case(run=SHORT)))
-    twice, calm = [(100, 0, 0.01), (100, 1, 0.01)], [(100, 0, 0.01), (200, 0, 1000.0), (300, 0, 0.01)]
+    twice, calm = (
+        [(100, 0, 0.01), (100, 1, 0.01)],
+        [(100, 0, 0.01), (200, 0, 1000.0), (300, 0, 0.01)],
+    )
     for rows, kind, told in (
         (twice, failures.EngineFailure, "bead"),
         (calm, failures.BlowUp, r"moves at 1e\+03 m/s after step 200"),
     ):  # step, lost beads, speed (m/s)
         lines = [
-            f" {step} {deck.layout.atoms - lost} {speed} -1e-3 1e-3 -1e-3 1e-3 0 1e-3" for step, lost, speed in rows
+            f" {step} {deck.layout.atoms - lost} {speed} -1e-3 1e-3 -1e-3 1e-3 0 1e-3"
+            for step, lost, speed in rows
         ]
         log = tmp_path / "engine.log"
         log.write_text("\n".join(["LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0, x)", *lines, ""]))
@@ -521,7 +630,9 @@ def test_tables_of_an_edited_deck_have_decimal_points_in_any_language(
     """The engine calls awk, which would write the decimal commas of the user's language."""
     (in_folder / "bin").mkdir()
     awk = in_folder / "bin" / "awk"
-    awk.write_text(f'#!/bin/sh\necho "$LC_ALL" >> {in_folder}/language\nexec {shutil.which("awk")} "$@"\n')
+    awk.write_text(
+        f'#!/bin/sh\necho "$LC_ALL" >> {in_folder}/language\nexec {shutil.which("awk")} "$@"\n'
+    )
     awk.chmod(0o755)
     monkeypatch.setenv("PATH", f"{in_folder}/bin:{os.environ['PATH']}")
     monkeypatch.setenv("LC_ALL", "de_DE.UTF-8")
@@ -544,7 +655,14 @@ def test_a_pile_without_dumps_has_no_restart_files(pile_run: Path, tmp_path: Pat
 def test_steps_per_second_are_those_of_the_engines_loop(tmp_path: Path) -> None:
     """1000 steps in 2 s; the engine also took 2 s to start."""
     report = EngineReport("LIGGGHTS", wall_seconds=4.0, loop_seconds=2.0, steps=1000)
-    write_manifest(make_case(), "test-0123456789ab", None, report, started=time.time() - 5.0, directory=tmp_path)
+    write_manifest(
+        make_case(),
+        "test-0123456789ab",
+        None,
+        report,
+        started=time.time() - 5.0,
+        directory=tmp_path,
+    )
     manifest = read_manifest(tmp_path)
     assert (manifest["steps"], manifest["steps_per_second"]) == (1000, 500.0)
     assert (manifest["seconds"]["engine"], manifest["seconds"]["engine_loop"]) == (4.0, 2.0)
@@ -552,7 +670,9 @@ def test_steps_per_second_are_those_of_the_engines_loop(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["CONTENT_VERSION", "FORMAT"])
-def test_decks_of_another_version_are_other_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_decks_of_another_version_are_other_runs(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     case, engine = make_case(), find_engine()
     place = run_place(case, engine, tmp_path)
     assert run_place(case, engine, tmp_path) == place

@@ -23,7 +23,18 @@ import pyarrow.parquet as pq
 import pytest
 
 from tests.cluster import LOCAL, slurm_cluster, why_not
-from tests.conftest import PATIENCE, PROGRAM, TINY, bits, call, document, finished_places, make_case, to_toml, wait_for
+from tests.conftest import (
+    PATIENCE,
+    PROGRAM,
+    TINY,
+    bits,
+    call,
+    document,
+    finished_places,
+    make_case,
+    to_toml,
+    wait_for,
+)
 from walkers.errors import InputError
 from walkers.files import write_json
 from walkers.inputs.resolving.loads import dimer_of
@@ -70,7 +81,9 @@ def test_walkers_that_meet_are_taken_apart(tmp_path: Path, monkeypatch: pytest.M
     """They have room for more than they walk; so what counts as near is made larger than all of it."""
     monkeypatch.setattr("walkers.runs.splitting.NEAR", 1e3)
     with pytest.raises(WalkersMet):
-        make_runs([make_case(run={**TINY, "seed": seed}) for seed in (1, 2)], tmp_path, find_engine())
+        make_runs(
+            [make_case(run={**TINY, "seed": seed}) for seed in (1, 2)], tmp_path, find_engine()
+        )
     assert not list(tmp_path.glob("*"))
 
 
@@ -79,19 +92,28 @@ def test_what_may_differ_within_a_deck() -> None:
     lab, gravity = {"drive": {"frame": "lab"}}, {"environment": {"gravity": "0 m/s^2"}}
     same: list[dict[str, Any]] = [
         {},
-        {"run": {"seed": 2}, "dimers": {"angle": "30 deg", "replicates": 3, "radii": ["0.35 mm", "0.2 mm"]}},
+        {
+            "run": {"seed": 2},
+            "dimers": {"angle": "30 deg", "replicates": 3, "radii": ["0.35 mm", "0.2 mm"]},
+        },
         {"contact": {"friction": {"bead_bead": 0.2, "bead_wall": 0.05}, "restitution": 0.6}},
         {"drive": {"peak_acceleration": "5 g", "axis": "y"}, "boundary": {"tilt": "20 deg"}},
         {"liquid": {"viscosity_ratio": 2.0}, **gravity},
     ]
     other: list[dict[str, Any]] = [
         *({"drive": drive} for drive in ({"frequency": "60 Hz"}, {"phase": "90 deg"})),
-        *({"contact": contact} for contact in ({"rolling_friction": 0.003}, {"youngs_modulus": "40 MPa"})),
+        *(
+            {"contact": contact}
+            for contact in ({"rolling_friction": 0.003}, {"youngs_modulus": "40 MPa"})
+        ),
         *({"run": run} for run in ({"cycles": 30}, {"time_step": "1 us"})),
         {"beads": {"density": "3.9 g/cm^3"}},
         *(lab, {"drive": {"frame": "lab", "peak_acceleration": "5 g"}}, lab | gravity),
     ]
-    shared, apart = ([make_case(**{**one, "run": STEP | one.get("run", {})}) for one in of] for of in (same, other))
+    shared, apart = (
+        [make_case(**{**one, "run": STEP | one.get("run", {})}) for one in of]
+        for of in (same, other)
+    )
     assert len({*map(sharing_key, shared)}) == 1
     assert len({sharing_key(case) for case in [shared[0], *apart]}) == 1 + len(apart)
     rough = [make_case(run=STEP, contact={"rolling_friction": value}) for value in (0.003, 0.006)]
@@ -120,7 +142,9 @@ def test_every_point_travels_once_and_cores_finish_together(sweep: str, workers:
     for deck in decks:
         assert len({sharing_key(cases[point]) for point in deck.points}) == 1
         walkers = sum(cases[point].walkers[0].replicates for point in deck.points)
-        assert len(deck.points) == 1 or (walkers <= MOST_WALKERS and deck.seconds <= LONGEST_SECONDS)
+        assert len(deck.points) == 1 or (
+            walkers <= MOST_WALKERS and deck.seconds <= LONGEST_SECONDS
+        )
     seconds = [deck.seconds for deck in decks]
     assert seconds == sorted(seconds, reverse=True)
     # Within a fifth of the time in which no core would ever be idle, unless a single deck takes longer than that.
@@ -141,14 +165,22 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("swept")
     (folder / "base.toml").write_text(to_toml(document(run=TINY, dimers={"replicates": 2})))
     radii = [["0.3 mm", "0.2 mm"], ["0.25 mm", "0.25 mm"]]
-    sweep = {"case": "base.toml", "axes": {"dimers.radii": radii, "run.time_step": ["2 us", "auto"]}}
+    sweep = {
+        "case": "base.toml",
+        "axes": {"dimers.radii": radii, "run.time_step": ["2 us", "auto"]},
+    }
     (folder / "test.toml").write_text(to_toml(sweep))
-    assert call("sweep", "test.toml", folder=folder).stdout.splitlines()[0] == "test: 4 points, 4 finished"
+    assert (
+        call("sweep", "test.toml", folder=folder).stdout.splitlines()[0]
+        == "test: 4 points, 4 finished"
+    )
     shutil.rmtree(load(folder / "runs" / "test")["run"][3])
     return folder
 
 
-def test_a_plan_of_a_sweep_runs_nothing_and_counts_what_is_missing(sweep_file: Callable[..., str]) -> None:
+def test_a_plan_of_a_sweep_runs_nothing_and_counts_what_is_missing(
+    sweep_file: Callable[..., str],
+) -> None:
     name = sweep_file("[axes]\nrun.seed = [1, 2]")
     assert "2 points in 1 deck\n" in call("sweep", name, "-j", "1", "--dry-run", check=True).stdout
     assert not Path("runs").exists()
@@ -167,7 +199,11 @@ def test_a_table_has_the_values_of_each_point_in_the_units_of_the_sweep(swept: P
     }
     assert {name: list(frame[name]) for name in expected} == expected
     units = frame.attrs["units"]
-    assert (units["run.time_step"], units["dimers.radii[1]"], units["velocity"]) == ("us", "mm", "m/s")
+    assert (units["run.time_step"], units["dimers.radii[1]"], units["velocity"]) == (
+        "us",
+        "mm",
+        "m/s",
+    )
 
 
 def test_a_table_has_the_results_of_its_runs(swept: Path) -> None:
@@ -206,14 +242,18 @@ def test_a_table_is_printed_as_json_and_as_text(swept: Path) -> None:
     assert Path(frame["run"][0]).name not in text
 
 
-def test_a_descent_finds_where_the_walkers_stop(sweep_file: Callable[..., str], in_folder: Path) -> None:
+def test_a_descent_finds_where_the_walkers_stop(
+    sweep_file: Callable[..., str], in_folder: Path
+) -> None:
     """Coulomb friction: the threshold lies where inertia of the beads overcomes it, whatever the frequency."""
     text = '[axes]\ndrive.frequency = ["60 Hz", "90 Hz"]\n'
     text += '[descend]\nfrom = "1.4 g"\nto = "0.2 g"\nstep = "0.2 g"\nuntil_below = "0.002 mm/s"'
     done = call("sweep", sweep_file(text, run={"cycles": 20, "settling_cycles": 10}))
     assert done.returncode == 0, done.stderr
     for _, descent in load(in_folder / "runs" / "test").groupby("drive.frequency"):
-        assert list(descent["drive.peak_acceleration"]) == pytest.approx([1.4 - 0.2 * n for n in range(7)])
+        assert list(descent["drive.peak_acceleration"]) == pytest.approx(
+            [1.4 - 0.2 * n for n in range(7)]
+        )
         assert list(descent["velocity"] < 2e-6) == sorted(descent["velocity"] < 2e-6)
     ends = thresholds(load(in_folder / "runs" / "test"))
     assert list(ends["moving"] - ends["at_rest"]) == pytest.approx([0.2, 0.2])
@@ -227,7 +267,10 @@ set.run.allow_unstable = true
 run.seed = [1, 2, 3, 4, 5]
 run.time_step = ["2 us", "2 us", "30 us", "2 us", "2 us"]
 """
-GLYCEROL = {"liquid": {"name": "glycerol 87 %"}, "run": {**TINY, "cycles": 20, "samples_per_cycle": 1}}
+GLYCEROL = {
+    "liquid": {"name": "glycerol 87 %"},
+    "run": {**TINY, "cycles": 20, "samples_per_cycle": 1},
+}
 LOSES = "s/^run /group gone id 2\\ndelete_atoms group gone compress no\\nrun /"
 FAILING: dict[str, tuple[str, dict[str, Any], str, tuple[str, int, str]]] = {
     # A sweep whose third point fails, changes of its case, script of the engine, reason, lost beads, message.
@@ -250,7 +293,11 @@ def test_a_failing_point_does_not_stop_the_others(
     log = in_folder / "launches"
     engine = front(f'pwd >> {log}\n{script}\nexec liggghts "$@"')
     done = call("sweep", sweep_file(text, **changes), "-j", "1", "--engine", engine)
-    assert (done.returncode, "point 2, base-" in done.stderr, message in done.stderr) == (1, True, True)
+    assert (done.returncode, "point 2, base-" in done.stderr, message in done.stderr) == (
+        1,
+        True,
+        True,
+    )
     frame = load("runs/test")
     assert list(frame["status"]) == [DONE, DONE, "failed", DONE, DONE]
     assert (frame["reason"][2], list(frame["lost"])) == (reason, [0, 0, lost, 0, 0])
@@ -259,16 +306,29 @@ def test_a_failing_point_does_not_stop_the_others(
     assert "5 points, 4 finished, 1 failed" in call("list", "runs/test", check=True).stdout
     log.unlink()
     assert call("sweep", "test.toml", "--engine", engine).returncode == 1
-    launched = [part for place in log.read_text().split() for part in Path(place).parts if "incomplete" in part]
+    launched = [
+        part
+        for place in log.read_text().split()
+        for part in Path(place).parts
+        if "incomplete" in part
+    ]
     assert launched == [failed.name]
 
 
 SIXTEEN = "[axes]\ncontact.restitution = { linspace = [0.3, 0.6, 16] }"
 HITS_ALL = {
     # Script of an engine that is noted at each start, launches at most, message.
-    "no licence": ("echo 'LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0'; echo 'ERROR: no licence'", 8, "no licence"),
+    "no licence": (
+        "echo 'LIGGGHTS (Version LIGGGHTS-PUBLIC 3.8.0'; echo 'ERROR: no licence'",
+        8,
+        "no licence",
+    ),
     "dies at once": ("exit 7", 3, "never started"),
-    "another version": ('liggghts "$@" | sed "s/LIGGGHTS-PUBLIC 3.8.0/LIGGGHTS-PUBLIC 4.0.0/"', 1, "4.0.0"),
+    "another version": (
+        'liggghts "$@" | sed "s/LIGGGHTS-PUBLIC 3.8.0/LIGGGHTS-PUBLIC 4.0.0/"',
+        1,
+        "4.0.0",
+    ),
 }
 
 
@@ -280,9 +340,15 @@ def test_a_failure_of_every_point_stops_the_sweep(
     launches = in_folder / "launches"
     engine = front(f"echo >> {launches}\n{script}")
     done = call("sweep", sweep_file(SIXTEEN), "-j", "1", "--engine", engine)
-    assert (done.returncode, "Traceback" in done.stderr, done.stderr.count(message)) == (1, False, 1), done.stderr
+    assert (done.returncode, "Traceback" in done.stderr, done.stderr.count(message)) == (
+        1,
+        False,
+        1,
+    ), done.stderr
     assert 1 <= len(launches.read_text().splitlines()) <= most
-    assert "16 points in" in call("sweep", "test.toml", "--dry-run").stdout  # the next call makes all of them
+    assert (
+        "16 points in" in call("sweep", "test.toml", "--dry-run").stdout
+    )  # the next call makes all of them
 
 
 def test_two_sweeps_over_the_same_points_share_them(
@@ -305,15 +371,24 @@ def test_two_sweeps_over_the_same_points_share_them(
     wait_for(lambda: program.poll() is not None or log.exists())
     assert call("sweep", "second.toml", "-j", "2", "--engine", engine).returncode == 0
     assert program.wait(timeout=PATIENCE) == 0
-    runs = {run for name in points for run in zip(points[name], load(f"runs/{name}")["run"], strict=True)}
-    made = {str(path.parent.relative_to(in_folder)) for path in in_folder.glob("runs/base-*/manifest.json")}
+    runs = {
+        run
+        for name in points
+        for run in zip(points[name], load(f"runs/{name}")["run"], strict=True)
+    }
+    made = {
+        str(path.parent.relative_to(in_folder))
+        for path in in_folder.glob("runs/base-*/manifest.json")
+    }
     assert {run for _, run in runs} == made
     assert len(made) == len(runs) == 5
     launches = log.read_text().split()
     assert len(set(launches)) == len(launches) <= 5
 
 
-def test_workers_that_are_handed_over_give_the_same(sweep_file: Callable[..., str], in_folder: Path) -> None:
+def test_workers_that_are_handed_over_give_the_same(
+    sweep_file: Callable[..., str], in_folder: Path
+) -> None:
     """The example of the documentation; and a pool that breaks."""
     page = (Path(__file__).parents[1] / "docs" / "how-to" / "clusters.md").read_text("utf-8")
     _, script = re.findall(r"```python\n(.+?)```", page, re.DOTALL)
@@ -332,10 +407,14 @@ def test_workers_that_are_handed_over_give_the_same(sweep_file: Callable[..., st
             run_sweep(load_sweep("sweep.toml"), in_folder / "again", options, engine=engine)
 
 
-def test_another_sweep_of_the_same_name_is_told(sweep_file: Callable[..., str], in_folder: Path) -> None:
+def test_another_sweep_of_the_same_name_is_told(
+    sweep_file: Callable[..., str], in_folder: Path
+) -> None:
     """Afterwards by a warning, at the same time by an error; an edit that keeps a point is neither."""
     axis = "[axes]\ndrive.peak_acceleration = "
-    first, edited, other = (load_sweep(sweep_file(axis + a)) for a in ('["2 g"]', '["2 g", "3 g"]', '["4 g"]'))
+    first, edited, other = (
+        load_sweep(sweep_file(axis + a)) for a in ('["2 g"]', '["2 g", "3 g"]', '["4 g"]')
+    )
     out = in_folder / "runs"
     with warnings.catch_warnings():
         warnings.simplefilter("error", SweepReplacedWarning)
@@ -348,7 +427,9 @@ def test_another_sweep_of_the_same_name_is_told(sweep_file: Callable[..., str], 
         run_sweep(edited, out / "new", Options(1), on_progress=lambda _: write_record(record))
 
 
-def test_the_share_of_a_sweep_that_is_done_is_that_of_its_work(sweep_file: Callable[..., str], in_folder: Path) -> None:
+def test_the_share_of_a_sweep_that_is_done_is_that_of_its_work(
+    sweep_file: Callable[..., str], in_folder: Path
+) -> None:
     """Of two points in decks of their own the first costs most: when it is done, so is most of the work, not half.
 
     Each deck waits until the progress before it was seen.
@@ -390,23 +471,45 @@ def test_the_share_of_a_shared_deck_is_that_of_its_steps(tmp_path: Path) -> None
 
 
 def test_what_parsl_is_told(tmp_path: Path) -> None:
-    file = {"partition": "main", "account": "granular", "walltime": "02:00:00", "nodes": 2, "jobs": 4, "cores": 16}
+    file = {
+        "partition": "main",
+        "account": "granular",
+        "walltime": "02:00:00",
+        "nodes": 2,
+        "jobs": 4,
+        "cores": 16,
+    }
     file |= {"shell": ["module load openmpi", "ulimit -c 0"], "sbatch": ["--qos=long", "--mem=4G"]}
-    (tmp_path / "site.toml").write_text(to_toml(file | {"address": "10.1.0.1", "container": "apptainer exec w.sif"}))
+    (tmp_path / "site.toml").write_text(
+        to_toml(file | {"address": "10.1.0.1", "container": "apptainer exec w.sif"})
+    )
     config = load_site(tmp_path / "site.toml")
     assert [decks_at(config, ranks) for ranks in (1, 3, 17)] == [2 * 16 * 4, 2 * 5 * 4, 0]
-    assert [Options(6, site).for_ranks(3).decks_at_once for site in (config, None)] == [2 * 5 * 4, 2]
+    assert [Options(6, site).for_ranks(3).decks_at_once for site in (config, None)] == [
+        2 * 5 * 4,
+        2,
+    ]
     with pytest.raises(InputError, match="17 MPI processes"):
         Options(6, config).for_ranks(17)
     (executor,) = prepare(config, tmp_path / "parsl", 3).executors
     provider = executor.provider
-    told = {"partition": "main", "account": "granular", "walltime": "02:00:00", "exclusive": False, "min_blocks": 0}
+    told = {
+        "partition": "main",
+        "account": "granular",
+        "walltime": "02:00:00",
+        "exclusive": False,
+        "min_blocks": 0,
+    }
     told |= {"nodes_per_block": 2, "cores_per_node": 16, "max_blocks": 4}
     assert {name: getattr(provider, name) for name in told} == told
     assert type(provider.launcher).__name__ == "SrunLauncher"
     assert provider.worker_init.splitlines()[:2] == ["module load openmpi", "ulimit -c 0"]
     assert {"#SBATCH --qos=long", "#SBATCH --mem=4G"} <= {*provider.scheduler_options.splitlines()}
-    assert (executor.max_workers_per_node, executor.address, executor.encrypted) == (5, "10.1.0.1", True)
+    assert (executor.max_workers_per_node, executor.address, executor.encrypted) == (
+        5,
+        "10.1.0.1",
+        True,
+    )
     assert executor.launch_cmd.startswith("apptainer exec w.sif process_worker_pool.py ")
 
 
@@ -419,17 +522,34 @@ def test_workers_of_another_process_give_the_same(
     engine = front(f'{lost}\nexec liggghts "$@"')
     sweep_file('[axes]\nrun.time_step = ["2 us", "1 us"]')
     (in_folder / "site.py").write_text(LOCAL)
-    there = [PROGRAM, "sweep", "test.toml", "--out", "there", "--site", "site.py", "--engine", engine]
+    there = [
+        PROGRAM,
+        "sweep",
+        "test.toml",
+        "--out",
+        "there",
+        "--site",
+        "site.py",
+        "--engine",
+        engine,
+    ]
     program = subprocess.Popen(there, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    call("sweep", "test.toml", "--out", "here", "-j", "2", "--engine", engine, check=True)  # meanwhile
+    call(
+        "sweep", "test.toml", "--out", "here", "-j", "2", "--engine", engine, check=True
+    )  # meanwhile
     _, errors = program.communicate(timeout=PATIENCE)
     assert program.returncode == 0, errors
     assert bits(in_folder / "here") == bits(in_folder / "there") != {}
-    assert "WorkerLost" in "".join(log.read_text() for log in in_folder.glob("there/test/parsl/*/parsl.log"))
+    assert "WorkerLost" in "".join(
+        log.read_text() for log in in_folder.glob("there/test/parsl/*/parsl.log")
+    )
 
 
 # Eight frequencies, a deck each; at the third the time step is far beyond the viscous limit of glycerol.
-ZIP = {"drive.frequency": {"linspace": ["60 Hz", "67 Hz", 8]}, "run.time_step": ["2 us"] * 2 + ["40 us"] + ["2 us"] * 5}
+ZIP = {
+    "drive.frequency": {"linspace": ["60 Hz", "67 Hz", 8]},
+    "run.time_step": ["2 us"] * 2 + ["40 us"] + ["2 us"] * 5,
+}
 
 
 @pytest.fixture(scope="module")
@@ -444,23 +564,42 @@ def cluster() -> Iterator[dict[str, str]]:
 
 
 def test_a_sweep_through_slurm(
-    cluster: dict[str, str], sweep_file: Callable[..., str], in_folder: Path, front: Callable[[str], str]
+    cluster: dict[str, str],
+    sweep_file: Callable[..., str],
+    in_folder: Path,
+    front: Callable[[str], str],
 ) -> None:
     """A failing point, a pilot cancelled midway, an interrupt and a resumption: bit for bit what this machine gives."""
     name = sweep_file(to_toml({"set": {"run.allow_unstable": True}, "zip": [ZIP]}), **GLYCEROL)
-    site = {"partition": "main", "address": "127.0.0.1", "cores": 1, "jobs": 2, "sbatch": ["--comment=decks"]}
+    site = {
+        "partition": "main",
+        "address": "127.0.0.1",
+        "cores": 1,
+        "jobs": 2,
+        "sbatch": ["--comment=decks"],
+    }
     (in_folder / "site.toml").write_text(to_toml(site))
     # Seven launches are enough for four points, though one fails and one is cancelled; eight points need two more.
     log, go = in_folder / "launches", in_folder / "go"
     waits = f"[ $(wc -l < {log}) -le 7 ] || while ! [ -e {go} ]; do sleep 0.1; done"
-    command = ["sweep", name, "--engine", front(f'echo >> {log}\n{waits}\nexec liggghts "$@"'), "--out"]
+    command = [
+        "sweep",
+        name,
+        "--engine",
+        front(f'echo >> {log}\n{waits}\nexec liggghts "$@"'),
+        "--out",
+    ]
 
     def start() -> subprocess.Popen[str]:
         through = [PROGRAM, *command, "cluster", "--site", "site.toml"]
-        return subprocess.Popen(through, env=cluster, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        return subprocess.Popen(
+            through, env=cluster, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        )
 
     def jobs(*options: str) -> list[str]:
-        told = subprocess.run(["squeue", "-h", "-o", "%A", *options], env=cluster, capture_output=True, check=True)
+        told = subprocess.run(
+            ["squeue", "-h", "-o", "%A", *options], env=cluster, capture_output=True, check=True
+        )
         return told.stdout.decode().split()
 
     def has(least: int) -> bool:
@@ -481,7 +620,11 @@ def test_a_sweep_through_slurm(
     second = start()
     assert call(*command, "local").returncode == 1  # meanwhile
     _, errors = second.communicate(timeout=PATIENCE)
-    assert (second.returncode, "point 2, base-" in errors, "blow-up" in errors) == (1, True, True), errors
+    assert (second.returncode, "point 2, base-" in errors, "blow-up" in errors) == (
+        1,
+        True,
+        True,
+    ), errors
     wait_for(lambda: not jobs())
     assert list(load("cluster/test")["status"]) == ["finished"] * 2 + ["failed"] + ["finished"] * 5
     assert bits(in_folder / "cluster") == bits(in_folder / "local") != {}
@@ -512,4 +655,7 @@ def test_a_site_that_makes_no_sense(tmp_path: Path) -> None:
     for odd in ("100%N", "$(touch pwned)", "a b"):
         with pytest.raises(InputError, match=r"^out: .* expected letters"):
             check_path(tmp_path / odd / "fig2")
-    check_path(tmp_path / load_sweep("fig4", {"contact.rolling_friction": 0.01, "contact.restitution": 0.5}).name)
+    check_path(
+        tmp_path
+        / load_sweep("fig4", {"contact.rolling_friction": 0.01, "contact.restitution": 0.5}).name
+    )

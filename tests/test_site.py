@@ -15,7 +15,9 @@ DOCS = Path(__file__).resolve().parents[1] / "docs"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 TEXT_WIDTH = 624
 """Width of the text of a page in a window of 1280 pixels, as the theme lays it out."""
-THEME = "div.math { align-items: center; display: flex; flex-direction: row-reverse; max-width: 100%; }"
+THEME = (
+    "div.math { align-items: center; display: flex; flex-direction: row-reverse; max-width: 100%; }"
+)
 """What pydata-sphinx-theme says about formulas, before our own style sheet."""
 BLOCK = re.compile(r"^\$\$\n(.+?)\n\$\$$", re.MULTILINE | re.DOTALL)
 FORMULAS = {
@@ -43,7 +45,8 @@ def measure(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Measure]:
             body = f'<div style="width: {TEXT_WIDTH}px"><div class="math">{mathml}</div></div>'
             path = folder / "formula.html"
             path.write_text(
-                f'<!doctype html><meta charset="utf-8"><style>{THEME}\n{styles}</style>{body}', encoding="utf-8"
+                f'<!doctype html><meta charset="utf-8"><style>{THEME}\n{styles}</style>{body}',
+                encoding="utf-8",
             )
             page.goto(path.as_uri())
             numbers: dict[str, float] = page.evaluate(
@@ -70,7 +73,9 @@ def test_a_formula_that_is_too_wide_shows_its_beginning(measure: Measure) -> Non
 @pytest.mark.parametrize("formula", FORMULAS.values(), ids=FORMULAS.keys())
 def test_formulas_fit_into_a_page_at_1280_pixels(formula: str, measure: Measure) -> None:
     """With the packages of `make docs`, whose converter makes MathML of the formulas."""
-    pytest.importorskip("sphinx", reason="the formulas are converted by the packages of `make docs`")
+    pytest.importorskip(
+        "sphinx", reason="the formulas are converted by the packages of `make docs`"
+    )
     from docutils import nodes
 
     from docs._ext import mathml

@@ -48,7 +48,12 @@ fi
 exec liggghts "$@"
 """
 """An engine that does not end, but for the first that starts if there is a folder ``HALT``."""
-SETTLING = {"time_step": "3 us", "longest_settling": "0.02 s", "duration": "0.03 s", "segment": "0.01 s"}
+SETTLING = {
+    "time_step": "3 us",
+    "longest_settling": "0.02 s",
+    "duration": "0.03 s",
+    "segment": "0.01 s",
+}
 FILES: dict[str, dict[str, Any]] = {
     "walker": document(run={**SHORT, "time_step": "2 us", "segment": "25 ms"}),
     # Restarts must not lose how much liquid each bead has.
@@ -57,7 +62,10 @@ FILES: dict[str, dict[str, Any]] = {
     # Three decks, each of two points: another division after a stop would give other bits.
     "sweep": {
         "case": "base.toml",
-        "axes": {"drive.frequency": ["60 Hz", "70 Hz", "80 Hz"], "dimers.angle": ["0 deg", "10 deg"]},
+        "axes": {
+            "drive.frequency": ["60 Hz", "70 Hz", "80 Hz"],
+            "dimers.angle": ["0 deg", "10 deg"],
+        },
     },
 }
 FILES["pile"]["liquid"] |= {"conserved": True, "law": "willett"}
@@ -66,8 +74,22 @@ SWEEP, SITE = "sweep sweep.toml -j 2", "sweep sweep.toml --site site.py"
 STOPS: dict[str, tuple[str, int, str, str, int, str]] = {
     # Command, engines at that time, signals, to whom, exit status, last line.
     "a run, Ctrl-C": ("run walker.toml", 1, "INT", "program", 130, "interrupted"),
-    "a run, closed terminal under nohup": ("run walker.toml", 1, "HUP TERM", "nohup", 143, "terminated"),
-    "a run, engine killed": ("run walker.toml", 1, "KILL", "engine", 1, "the engine was killed by SIGKILL"),
+    "a run, closed terminal under nohup": (
+        "run walker.toml",
+        1,
+        "HUP TERM",
+        "nohup",
+        143,
+        "terminated",
+    ),
+    "a run, engine killed": (
+        "run walker.toml",
+        1,
+        "KILL",
+        "engine",
+        1,
+        "the engine was killed by SIGKILL",
+    ),
     "a check, Ctrl-C": ("check engine --only restart", 1, "INT", "program", 130, "interrupted"),
     "a pile, killed": ("run pile.toml", 1, "KILL", "program", -9, ""),
     "a sweep, Ctrl-C": (SWEEP, 2, "INT", "group", 130, "interrupted"),
@@ -104,12 +126,22 @@ def stopping(undisturbed: Path, in_folder: Path, monkeypatch: pytest.MonkeyPatch
     return in_folder
 
 
-@pytest.mark.parametrize("name", [pytest.param(one, marks=[pytest.mark.slow] * ("pilots" in one)) for one in STOPS])
-def test_stopped_and_gone_on(name: str, stopping: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=[pytest.mark.slow] * ("pilots" in one)) for one in STOPS]
+)
+def test_stopped_and_gone_on(
+    name: str, stopping: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The first engine has ended well by then: its segment or run is kept, and nobody makes it again."""
     (command, number, signals, whom, status, last), out = STOPS[name], stopping / "runs"
     program = subprocess.Popen(
-        [*(["nohup"] if whom == "nohup" else []), PROGRAM, *command.split(), "--engine", "./engine"],
+        [
+            *(["nohup"] if whom == "nohup" else []),
+            PROGRAM,
+            *command.split(),
+            "--engine",
+            "./engine",
+        ],
         start_new_session=True,
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
@@ -160,13 +192,17 @@ def test_stopped_and_gone_on(name: str, stopping: Path, undisturbed: Path, monke
 def _halted(folder: Path, number: int) -> list[int]:
     """The engines that do not end, as soon as there are so many and the first has ended."""
     launches = (folder / "launches").read_text().split() if (folder / "launches").exists() else []
-    engines = engines_in(folder) if len(launches) == number + 1 else []  # a look at all processes takes long
+    engines = (
+        engines_in(folder) if len(launches) == number + 1 else []
+    )  # a look at all processes takes long
     return engines if len(engines) == number else []
 
 
 def _listens_to_nobody(program: int) -> None:
     """A program has engines as its only children, without daemons; no port is open."""
-    engines = wait_for(lambda: [one for one in psutil.Process(program).children() if one.name() == "liggghts"])
+    engines = wait_for(
+        lambda: [one for one in psutil.Process(program).children() if one.name() == "liggghts"]
+    )
     family = [psutil.Process(program), *psutil.Process(program).children(recursive=True)]
     assert len(family) == len(engines) + 1, family
     ports = [port for each in family for port in each.net_connections()]
@@ -177,14 +213,24 @@ def _listens_to_nobody(program: int) -> None:
 def _reachable(program: int, folder: Path) -> set[str]:
     """What a program and those that work in a folder listen on that others than this machine may reach."""
     found = set()
-    for pid in {*processes_in(folder), *(one.pid for one in psutil.Process(program).children(recursive=True))}:
+    for pid in {
+        *processes_in(folder),
+        *(one.pid for one in psutil.Process(program).children(recursive=True)),
+    }:
         with suppress(psutil.Error, OSError):  # gone by now
-            process, devices = psutil.Process(pid), Path(f"/proc/{pid}/net/dev").read_text().splitlines()[2:]
+            process, devices = (
+                psutil.Process(pid),
+                Path(f"/proc/{pid}/net/dev").read_text().splitlines()[2:],
+            )
             ports = (
-                process.net_connections("inet") if [line.split(":")[0].strip() for line in devices] != ["lo"] else ()
+                process.net_connections("inet")
+                if [line.split(":")[0].strip() for line in devices] != ["lo"]
+                else ()
             )
             for port in (port for port in ports if port.laddr and not port.raddr):
-                if not ip_address(port.laddr.ip.partition("%")[0].removeprefix("::ffff:")).is_loopback:
+                if not ip_address(
+                    port.laddr.ip.partition("%")[0].removeprefix("::ffff:")
+                ).is_loopback:
                     found.add(f"{process.name()} {port.type.name} {port.laddr}")
     return found
 
@@ -193,7 +239,10 @@ def test_mpirun_and_its_engines_listen_to_nobody_beyond_this_machine(in_folder: 
     if not _off_the_network():
         pytest.skip("mpirun listens on every address where nobody may have a network of his own")
     command = [PROGRAM, "run", "pile-ci", "--set", "run.ranks=2", "--set", "run.duration=100 s"]
-    program, found = subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL), set[str]()
+    program, found = (
+        subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL),
+        set[str](),
+    )
 
     def looked() -> bool:
         """Until beads have moved."""
@@ -216,7 +265,9 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(
     monkeypatch.setattr("walkers.runner.directory._PATIENCE_SECONDS", 0.5)
     case, engine = make_case(run=LONG), front('liggghts "$@"\nexit 0')
     (in_folder / "test.toml").write_text(to_toml(document(run=LONG)))
-    program = subprocess.Popen([PROGRAM, "run", "test.toml", "--engine", engine], stderr=subprocess.DEVNULL)
+    program = subprocess.Popen(
+        [PROGRAM, "run", "test.toml", "--engine", engine], stderr=subprocess.DEVNULL
+    )
     wait_for(lambda: program.poll() is not None or list(in_folder.rglob("beads.bin")))
     assert program.poll() is None
     program.kill()

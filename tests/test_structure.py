@@ -28,13 +28,26 @@ CUTTING = {
     "count",
 }
 """Methods that search a text or cut it."""
-TEXTS = {"message", "reason", "expected", "meaning", "label", "notes", "warnings", "problems", "args"}
+TEXTS = {
+    "message",
+    "reason",
+    "expected",
+    "meaning",
+    "label",
+    "notes",
+    "warnings",
+    "problems",
+    "args",
+}
 """Attributes that are sentences, or hold them."""
 ALLOWED = {
     # Parsl repeats its first error, and has no other form of it.
     ("walkers/sweeps/scheduler.py", "str(error).partition('Error 2:')"),
     # A label with a place for the number of a bead, such as "rotation of bead *".
-    ("walkers/postprocess/measure/quantities.py", "quantity.label.replace('*', number[1] if number else '*')"),
+    (
+        "walkers/postprocess/measure/quantities.py",
+        "quantity.label.replace('*', number[1] if number else '*')",
+    ),
 }
 """What takes no decision."""
 
@@ -55,14 +68,18 @@ def _is_message(value: ast.expr, errors: set[str]) -> bool:
 
 def _decisions_from_texts(tree: ast.AST) -> Iterator[str]:
     """Expressions that search or cut a message."""
-    errors = {node.name for node in ast.walk(tree) if isinstance(node, ast.ExceptHandler) and node.name}
+    errors = {
+        node.name for node in ast.walk(tree) if isinstance(node, ast.ExceptHandler) and node.name
+    }
     errors |= {"error", "failure", "stop", "warning", "problem"}
     for node in ast.walk(tree):
         match node:
             case ast.Call(func=ast.Attribute(value=value, attr=method), args=[_, *_]):
                 if method in CUTTING and _is_message(value, errors):
                     yield ast.unparse(node)
-            case ast.Compare(left=ast.Constant(str()), ops=[ast.In() | ast.NotIn()], comparators=[value]):
+            case ast.Compare(
+                left=ast.Constant(str()), ops=[ast.In() | ast.NotIn()], comparators=[value]
+            ):
                 if _is_message(value, errors):
                     yield ast.unparse(node)
             case ast.Assign(targets=[ast.Attribute(attr="args")]):
@@ -108,7 +125,9 @@ def test_contributing_names_every_room_and_no_other() -> None:
 
 
 def test_rooms_are_listed_in_the_order_in_which_they_know_each_other() -> None:
-    (contract, *_) = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]["contracts"]
+    (contract, *_) = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"][
+        "importlinter"
+    ]["contracts"]
     layers = [set(layer.split(" | ")) for layer in reversed(contract["layers"])]
     place = {room: number for number, layer in enumerate(layers) for room in layer}
     rooms = _rooms_of_the_table()
@@ -117,8 +136,14 @@ def test_rooms_are_listed_in_the_order_in_which_they_know_each_other() -> None:
 
 def test_contributing_gives_a_reason_for_every_entry_at_the_top() -> None:
     _, _, table = CONTRIBUTING.partition("| entry | reason |")
-    named = set(re.findall(r"`([\w.]+)`", "".join(re.findall(r"(?m)^\| (`[^|]+) \|", table.split("\n\n")[0]))))
-    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    named = set(
+        re.findall(
+            r"`([\w.]+)`", "".join(re.findall(r"(?m)^\| (`[^|]+) \|", table.split("\n\n")[0]))
+        )
+    )
+    listed = subprocess.run(
+        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout
     assert named == {file.partition("/")[0] for file in listed.splitlines()}
 
 

@@ -36,14 +36,18 @@ def test_literature_prints_published_impacts_beside_ours(tmp_path: Path) -> None
 def test_paper_draws_what_is_asked_for_from_runs_that_it_makes_once(
     in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("walkers.inputs.resolving.length._MOST_CYCLES", 12)  # of 60: Fig. 4b would take them all
+    monkeypatch.setattr(
+        "walkers.inputs.resolving.length._MOST_CYCLES", 12
+    )  # of 60: Fig. 4b would take them all
     options = ("--only", "fig4", "--format", "svg", "--out", "mine")
     call(*options, "-j", "1", study="studies.paper", check=True)
     finished = {path: path.stat().st_mtime_ns for path in Path("mine").glob("*/manifest.json")}
     assert len(finished) == 2
     done = call(*options, "--to", "drawn", study="studies.paper", check=True)
     assert done.stdout == "drawn/fig4.svg\n"
-    assert {path: path.stat().st_mtime_ns for path in Path("mine").glob("*/manifest.json")} == finished
+    assert {
+        path: path.stat().st_mtime_ns for path in Path("mine").glob("*/manifest.json")
+    } == finished
     assert [path.name for path in Path("figures").iterdir()] == ["fig4.svg"]
 
 
@@ -74,13 +78,25 @@ def test_article_is_one_file_with_its_pictures_and_a_pdf(tmp_path: Path) -> None
 
 
 BAD_INPUT = [
-    ("paper", "--only fig9", '--only: no figure "fig9"; expected one of fig1b, fig2, fig2-threshold, fig3, fig4'),
+    (
+        "paper",
+        "--only fig9",
+        '--only: no figure "fig9"; expected one of fig1b, fig2, fig2-threshold, fig3, fig4',
+    ),
     ("paper", "--format gif", "gif"),
     ("paper", "--to a-file", "--to: expected a folder, a-file is a file"),
-    ("paper", "--engine /nowhere", "--engine /nowhere: expected the name or path of a liggghts binary"),
+    (
+        "paper",
+        "--engine /nowhere",
+        "--engine /nowhere: expected the name or path of a liggghts binary",
+    ),
     ("paper", "--jobs 0", "--jobs"),
     ("paper", "fig4", "Unexpected: fig4. See: python -m studies.paper --help"),
-    ("literature", "impacts", "no check 'impacts'; expected one of benchmarks, bridges, crosscheck, experiments"),
+    (
+        "literature",
+        "impacts",
+        "no check 'impacts'; expected one of benchmarks, bridges, crosscheck, experiments",
+    ),
     ("literature", "--out a-file", "a-file"),
     ("effects", "lift", "Unexpected: lift. See: python -m studies.effects --help"),
     ("article", "", "OUT"),
@@ -105,14 +121,21 @@ def test_article_refuses_a_file_as_its_folder(in_folder: Path) -> None:
     pytest.importorskip("sphinx", reason="without it, this is refused first")
     Path("a-file").write_text("mine", encoding="utf-8")
     done = call("a-file", study="studies.article")
-    assert (done.returncode, done.stderr) == (2, "walkers: a-file: expected a folder, this is a file\n")
+    assert (done.returncode, done.stderr) == (
+        2,
+        "walkers: a-file: expected a folder, this is a file\n",
+    )
 
 
-@pytest.mark.parametrize(("study", "package"), [("literature", "numba"), ("effects", "numba"), ("article", "sphinx")])
+@pytest.mark.parametrize(
+    ("study", "package"), [("literature", "numba"), ("effects", "numba"), ("article", "sphinx")]
+)
 def test_a_study_names_the_package_that_it_needs(
     study: str, package: str, in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in [name for name in sys.modules if name.startswith(("studies.", "walkers.second_engine"))]:
+    for name in [
+        name for name in sys.modules if name.startswith(("studies.", "walkers.second_engine"))
+    ]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
     arguments = ["there"] if study == "article" else []

@@ -55,8 +55,14 @@ COLOURS = ("#111111", "#1f4e8c")
 
 def _table(units: dict[str, str], rows: list[list[Any]], **speeds: Any) -> pd.DataFrame:
     """That of a sweep with a single axis as far as what varies goes, and columns of velocities, m/s."""
-    table = pd.DataFrame(rows, columns=list(units)).assign(point=range(len(rows)), status="finished", **speeds)
-    table.attrs |= {"units": units | dict.fromkeys(speeds, "m/s"), "varied": list(units), "axes": [tuple(units)]}
+    table = pd.DataFrame(rows, columns=list(units)).assign(
+        point=range(len(rows)), status="finished", **speeds
+    )
+    table.attrs |= {
+        "units": units | dict.fromkeys(speeds, "m/s"),
+        "varied": list(units),
+        "axes": [tuple(units)],
+    }
     table.attrs["title"] = ""
     return table
 
@@ -68,38 +74,59 @@ def test_a_figure_keeps_the_colours_of_the_project_wherever_it_is_drawn() -> Non
     table = _table(keys, rows, velocity=[1e-3, 2e-3, 3e-3, 4e-3])
     table.attrs["axes"] = [(key,) for key in keys]
     (panel,) = _panels(figure_of(table))
-    drawn_in = [line.get_color() for line in panel.lines if len(line.get_xdata()) == 2 and line.get_marker() != "None"]
+    drawn_in = [
+        line.get_color()
+        for line in panel.lines
+        if len(line.get_xdata()) == 2 and line.get_marker() != "None"
+    ]
     assert drawn_in == list(COLOURS[:2])
 
 
 @pytest.mark.parametrize(("error", "bars"), [(2e-4, 3), (2e-6, 0)])
-def test_error_bars_that_symbols_would_hide_are_left_out_and_the_figure_says_so(error: float, bars: int) -> None:
+def test_error_bars_that_symbols_would_hide_are_left_out_and_the_figure_says_so(
+    error: float, bars: int
+) -> None:
     speeds = {"velocity": [1e-3, 2e-3, 3e-3], "scatter": error}
     figure = figure_of(_table({"drive.frequency": "Hz"}, [[60.0], [70.0], [80.0]], **speeds))
     (panel,) = _panels(figure)
-    assert sum(len(one.get_segments()) for one in panel.collections if isinstance(one, LineCollection)) == bars
+    assert (
+        sum(len(one.get_segments()) for one in panel.collections if isinstance(one, LineCollection))
+        == bars
+    )
     said = " ".join(figure.get_suptitle().split())
-    assert (said, figure.legends) == (SCATTER if bars else f"{SCATTER}, smaller than the symbols", [])
+    assert (said, figure.legends) == (
+        SCATTER if bars else f"{SCATTER}, smaller than the symbols",
+        [],
+    )
 
 
 def test_axes_do_not_magnify_rounding() -> None:
     for values in ([1e-3, 1e-3 * (1.0 + 1e-9), 1e-3], [3.2e-18, -3.2e-18, 0.0]):
-        table = _table({"dimers.angle": "deg"}, [[-30.0], [-3.2e-15], [30.0]], velocity=values, scatter=0.0)
+        table = _table(
+            {"dimers.angle": "deg"}, [[-30.0], [-3.2e-15], [30.0]], velocity=values, scatter=0.0
+        )
         (panel,) = _panels(figure_of(table))
         assert np.ptp(panel.get_ylim()) > 0.1
         assert [label.get_text() for label in panel.get_xticklabels()] == ["-30", "0", "30"]
 
 
-def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_through: Path) -> None:
+def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(
+    looked_through: Path,
+) -> None:
     figure = walkers.load(looked_through / "three").figure(panels="frequency")
     first, second = _panels(figure)
     titles = [axes.get_title(loc="left") for axes in (first, second)]
     assert titles == ["(a) frequency = 60 Hz", "(b) frequency = 80 Hz"]
-    assert (first.get_xlabel(), first.get_ylabel()) == ("peak acceleration (g)", "velocity along the heading\n(mm/s)")
+    assert (first.get_xlabel(), first.get_ylabel()) == (
+        "peak acceleration (g)",
+        "velocity along the heading\n(mm/s)",
+    )
     assert (first.get_ylim(), _legend(figure)) == (second.get_ylim(), ["0.1", "0.2"])
     table = walkers.load(looked_through / "three").table()
     for friction, (x, y, errors) in zip((0.1, 0.2), _drawn(second), strict=True):
-        rows = table[(table["contact.friction.bead_wall"] == friction) & (table["drive.frequency"] == 80.0)]
+        rows = table[
+            (table["contact.friction.bead_wall"] == friction) & (table["drive.frequency"] == 80.0)
+        ]
         assert list(x) == [2.0, 4.0, 6.0]
         assert y == pytest.approx(rows["velocity"].to_numpy() * 1e3)
         assert errors == pytest.approx(rows["scatter"].to_numpy() * 1e3)
@@ -107,8 +134,18 @@ def test_axes_go_along_x_into_colours_and_into_panels_of_the_same_scales(looked_
 
 
 def test_a_key_with_one_value_among_the_finished_points_takes_no_colours() -> None:
-    keys = {"drive.frequency": "Hz", "liquid.surface_tension": "N/m", "contact.friction.bead_wall": ""}
-    rows = [[60.0, 0.03, 0.1], [70.0, 0.03, 0.1], [60.0, 0.03, 0.2], [70.0, 0.03, 0.2], [60.0, 0.07, 0.1]]
+    keys = {
+        "drive.frequency": "Hz",
+        "liquid.surface_tension": "N/m",
+        "contact.friction.bead_wall": "",
+    }
+    rows = [
+        [60.0, 0.03, 0.1],
+        [70.0, 0.03, 0.1],
+        [60.0, 0.03, 0.2],
+        [70.0, 0.03, 0.2],
+        [60.0, 0.07, 0.1],
+    ]
     table = _table(keys, rows, velocity=[1e-3, 2e-3, 3e-3, 4e-3, 5e-3])
     table.attrs["axes"] = [(key,) for key in keys]
     table.loc[4, "status"] = "missing"
@@ -127,14 +164,24 @@ def test_a_key_with_one_value_among_the_finished_points_takes_no_colours() -> No
             "expected contact.friction.bead_wall, or none to draw all values alike",
         ),
         (
-            ["drive.frequency", "contact.restitution", "contact.friction.bead_wall", "boundary.tilt"],
+            [
+                "drive.frequency",
+                "contact.restitution",
+                "contact.friction.bead_wall",
+                "boundary.tilt",
+            ],
             {"x": "restitution"},
             "panels: contact.friction.bead_wall, boundary.tilt vary beside contact.restitution (x), "
             "drive.frequency (hue): expected one of them, with the others fixed in the sweep file, "
             "or none to draw all values alike",
         ),
         (
-            ["drive.frequency", "contact.restitution", "contact.friction.bead_wall", "boundary.tilt"],
+            [
+                "drive.frequency",
+                "contact.restitution",
+                "contact.friction.bead_wall",
+                "boundary.tilt",
+            ],
             {"panels": "tilt"},
             "hue: contact.friction.bead_wall varies beside drive.frequency (x), contact.restitution (hue), "
             "boundary.tilt (panels): expected fewer keys in the sweep file, or none to draw all values alike",
@@ -153,23 +200,38 @@ def test_a_figure_does_not_hide_keys_unless_it_is_told_to(
     option = message.partition(":")[0]
     with pytest.warns(LeftOutWarning, match="not distinguished: .*friction bead wall"):
         (panel, *_) = _panels(figure_of(table, FigureOptions(**{**options, option: "none"})))
-    assert panel.lines[0].get_linestyle() == "None", "points of several values are not joined by a line"
+    assert panel.lines[0].get_linestyle() == "None", (
+        "points of several values are not joined by a line"
+    )
 
 
-def test_colours_have_the_first_other_key_and_what_follows_from_shown_columns_is_not_hidden() -> None:
+def test_colours_have_the_first_other_key_and_what_follows_from_shown_columns_is_not_hidden() -> (
+    None
+):
     """Tilt and restitution follow from the panel and the colour, the seed repeats; the axis has most values."""
-    keys = ["drive.frequency", "boundary.tilt", "contact.restitution", "drive.peak_acceleration", "run.seed"]
+    keys = [
+        "drive.frequency",
+        "boundary.tilt",
+        "contact.restitution",
+        "drive.peak_acceleration",
+        "run.seed",
+    ]
     rows = [
         [frequency, tilt, 0.3 + tilt / 100.0, acceleration, seed]
         for frequency, tilt, acceleration, seed in product((60, 70), (0, 10), (2, 4, 6), (1, 2))
     ]
-    table = _table(dict.fromkeys(keys, ""), rows, velocity=1e-3).assign(slope=[row[1] for row in rows])
+    table = _table(dict.fromkeys(keys, ""), rows, velocity=1e-3).assign(
+        slope=[row[1] for row in rows]
+    )
     table.attrs["axes"] = [(keys[0],), (keys[1],), (keys[2],), (keys[3],), (keys[4],)]
     table.attrs["units"] |= {"slope": ""}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         figure = figure_of(table, FigureOptions(panels="slope"))
-    assert [axes.get_title(loc="left") for axes in _panels(figure)] == ["(a) slope = 0", "(b) slope = 10"]
+    assert [axes.get_title(loc="left") for axes in _panels(figure)] == [
+        "(a) slope = 0",
+        "(b) slope = 10",
+    ]
     assert {axes.get_xlabel() for axes in _panels(figure)} == {"peak acceleration"}
     assert _legend(figure) == ["60", "70"]
 
@@ -182,12 +244,17 @@ def test_what_goes_where_can_be_chosen(looked_through: Path) -> None:
     # A column that follows from an axis stands for it.
     (axes,) = _panels(walkers.load(looked_through / "grid").figure(x="gamma0", log="x"))
     assert (axes.get_xlabel(), axes.get_xscale(), len(_drawn(axes))) == ("Γ0", "log", 2)
-    for x, log, told in (("liquid.name", "x", "has no numbers"), (None, "z", r"^log: 'z': expected one of x, y, xy$")):
+    for x, log, told in (
+        ("liquid.name", "x", "has no numbers"),
+        (None, "z", r"^log: 'z': expected one of x, y, xy$"),
+    ):
         with pytest.raises(InputError, match=told):
             walkers.load(looked_through / "beads").figure(x=x, log=log)
 
 
-def test_pairs_of_beads_can_be_shown_by_their_asymmetry_and_texts_as_categories(looked_through: Path) -> None:
+def test_pairs_of_beads_can_be_shown_by_their_asymmetry_and_texts_as_categories(
+    looked_through: Path,
+) -> None:
     figure = walkers.load(looked_through / "beads").figure(x="sin_delta")
     (axes,) = _panels(figure)
     assert axes.get_xlabel() == "sin δ"
@@ -215,7 +282,9 @@ def test_samples_have_a_panel_for_each_key(looked_through: Path) -> None:
         assert axes.containers[0][0].get_linestyle() == "None"  # type: ignore[index]
 
 
-def test_panels_of_a_sample_begin_with_the_strongest_key_and_log_uniform_ranges_have_log_axes() -> None:
+def test_panels_of_a_sample_begin_with_the_strongest_key_and_log_uniform_ranges_have_log_axes() -> (
+    None
+):
     """Titles have rank correlations, here by hand: the sum of d² of six ranks is 68; the other, 48, is too small.
 
     Five draws are too few, as are six of which one came apart.
@@ -239,7 +308,10 @@ def test_panels_of_a_sample_begin_with_the_strongest_key_and_log_uniform_ranges_
 def test_keys_that_vary_one_at_a_time_are_each_shown_with_the_usual_others() -> None:
     keys = ("contact.friction.bead_wall", "contact.restitution")
     rows = [[0.2, 0.5], [0.1, 0.5], [0.3, 0.5], [0.2, 0.9]]
-    for more, shown in (([], [(0.1, 0.2, 0.3), (0.5, 0.9)]), ([[0.1, 0.9]], [(0.1, 0.1, 0.2, 0.2, 0.3)] * 2)):
+    for more, shown in (
+        ([], [(0.1, 0.2, 0.3), (0.5, 0.9)]),
+        ([[0.1, 0.9]], [(0.1, 0.1, 0.2, 0.2, 0.3)] * 2),
+    ):
         speeds = np.arange(len(rows + more)) * 1e-3
         table = _table(dict.fromkeys(keys, ""), rows + more, velocity=speeds, scatter=1e-4)
         along = [_drawn(axes)[0][0] for axes in _panels(figure_of(table))]
@@ -255,15 +327,27 @@ def test_keys_that_go_together_are_one_factor() -> None:
         (both, [[0.1, 0.2], [0.2, 0.4], [0.3, 0.6]], [(both, [0.1, 0.2, 0.3], False)]),
         (both, [[0.1, 0.6], [0.2, 0.4], [0.3, 0.2]], [(both, [0.1, 0.2, 0.3], False)]),
         # The second stays the same in a step, and tells fewer points apart than the first.
-        (both, [[0.1, 0.6], [0.2, 0.6], [0.3, 0.2]], [((wall,), [0.1, 0.2, 0.3], True), ((bead,), [0.2, 0.6], True)]),
-        (both, [[0.1, 0.2], [0.2, 0.2], [0.3, 0.6]], [((wall,), [0.1, 0.2, 0.3], True), ((bead,), [0.2, 0.6], True)]),
+        (
+            both,
+            [[0.1, 0.6], [0.2, 0.6], [0.3, 0.2]],
+            [((wall,), [0.1, 0.2, 0.3], True), ((bead,), [0.2, 0.6], True)],
+        ),
+        (
+            both,
+            [[0.1, 0.2], [0.2, 0.2], [0.3, 0.6]],
+            [((wall,), [0.1, 0.2, 0.3], True), ((bead,), [0.2, 0.6], True)],
+        ),
         (
             both,
             [[0.1, 0.4], [0.2, 0.2], [0.3, 0.6]],
             [((wall,), [0.1, 0.2, 0.3], True), ((bead,), [0.2, 0.4, 0.6], True)],
         ),
         (named, [["a", 2.0], ["b", 10.0]], [(named, ["a", "b"], False)]),
-        (named, [["a", 2.0], ["a", 10.0], ["b", 2.0]], [(named, ["a, 2 g", "a, 10 g", "b, 2 g"], False)]),
+        (
+            named,
+            [["a", 2.0], ["a", 10.0], ["b", 2.0]],
+            [(named, ["a, 2 g", "a, 10 g", "b, 2 g"], False)],
+        ),
         (named, [["a", 2.0]], []),
     ]
     for keys, rows, factors in expected:
@@ -278,7 +362,9 @@ def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> N
     assert _legend(figure)[2:] == [MODEL, PAPER]
     lines = {line.get_linestyle(): line for line in axes.lines if line.get_color() == COLOURS[1]}
     table = walkers.load(directory).table()
-    predicted = [predict(case_of(Path(run))) for run in table.loc[table["drive.frequency"] == 80.0, "run"]]
+    predicted = [
+        predict(case_of(Path(run))) for run in table.loc[table["drive.frequency"] == 80.0, "run"]
+    ]
     for style, model in (("--", "viscous"), (":", "paper")):
         wanted = [one[model]["velocity"] * 1e3 for one in predicted]
         x, y = map(np.asarray, lines[style].get_data())
@@ -292,7 +378,9 @@ def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> N
         walkers.load(directory).figure(y="orientation_end", theory=True)
 
 
-@pytest.mark.parametrize(("far", "side"), [((0.1, 0.2), 1), ((-0.2, -0.1), 0)], ids=["above", "below"])
+@pytest.mark.parametrize(
+    ("far", "side"), [((0.1, 0.2), 1), ((-0.2, -0.1), 0)], ids=["above", "below"]
+)
 def test_a_theory_far_from_the_runs_is_shown_up_to_its_nearer_end(
     far: tuple[float, float], side: int, looked_through: Path
 ) -> None:
@@ -301,7 +389,10 @@ def test_a_theory_far_from_the_runs_is_shown_up_to_its_nearer_end(
     (axes,) = _panels(
         figure_of_table(
             table_of(read_record(looked_through / "grid")),
-            predict=lambda cases, _: ({name: np.linspace(*ends, len(cases)) for name, ends in curves.items()}, {}),
+            predict=lambda cases, _: (
+                {name: np.linspace(*ends, len(cases)) for name, ends in curves.items()},
+                {},
+            ),
         )
     )
     assert 100.0 < abs(axes.get_ylim()[side]) < 120.0
@@ -332,7 +423,9 @@ def _of_theory(axes: Axes) -> list[tuple[Any, Any]]:
 
 
 @pytest.mark.parametrize("name", ["driven", "rubbed"])
-def test_the_theory_is_a_fine_curve_along_keys_without_a_unit(name: str, without_units: Path) -> None:
+def test_the_theory_is_a_fine_curve_along_keys_without_a_unit(
+    name: str, without_units: Path
+) -> None:
     sweep = walkers.load(without_units / name)
     (axes,) = _panels(sweep.figure(theory=True))
     ((points, _, _),) = _drawn(axes)
@@ -349,7 +442,10 @@ def test_a_curve_along_a_number_that_follows_from_the_key_is_in_the_unit_of_the_
     without_units: Path, looked_through: Path
 ) -> None:
     """The acceleration (in g) that follows from Γ0, and Γ0, which follows from the acceleration."""
-    for sweep, x in ((without_units / "driven", "peak_acceleration"), (looked_through / "grid", "gamma0")):
+    for sweep, x in (
+        (without_units / "driven", "peak_acceleration"),
+        (looked_through / "grid", "gamma0"),
+    ):
         (axes,) = _panels(walkers.load(sweep).figure(theory=True, x=x))
         points = [x for x, _, _ in _drawn(axes)]
         lines = _of_theory(axes)
@@ -366,7 +462,9 @@ def test_numbers_of_replicates_have_no_theory_between_them(without_units: Path) 
     assert [list(x) for x, _ in _of_theory(axes)] == [[1.0, 2.0, 3.0]] * 2
 
 
-def test_points_that_are_not_finished_are_left_out_and_counted(looked_through: Path, tmp_path: Path) -> None:
+def test_points_that_are_not_finished_are_left_out_and_counted(
+    looked_through: Path, tmp_path: Path
+) -> None:
     out = tmp_path / "runs"
     shutil.copytree(looked_through, out)
     runs = walkers.load(out / "grid").table()["run"]
@@ -382,7 +480,10 @@ def test_points_that_are_not_finished_are_left_out_and_counted(looked_through: P
 
 def test_headings_that_differ_on_a_level_floor_are_not_averaged(tmp_path: Path) -> None:
     """Two tones push walkers of both headings the same way, the one forward and the other backward."""
-    tones = [{"frequency": "80 Hz", "peak_acceleration": "4 g"}, {"frequency": "160 Hz", "peak_acceleration": "3 g"}]
+    tones = [
+        {"frequency": "80 Hz", "peak_acceleration": "4 g"},
+        {"frequency": "160 Hz", "peak_acceleration": "3 g"},
+    ]
     short = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
     tables = {**document(dimers={"replicates": 2}, run=short), "drive": {"harmonics": tones}}
     sweep = {"case": "tones.toml", "axes": {"drive.harmonics[1].phase": ["0 deg", "90 deg"]}}
@@ -390,25 +491,38 @@ def test_headings_that_differ_on_a_level_floor_are_not_averaged(tmp_path: Path) 
         (tmp_path / f"{name}.toml").write_text(to_toml(contents))
     swept = walkers.sweep(tmp_path / "phases.toml", tmp_path / "runs")
     assert swept.table()["facings_differ"].any()
-    (header,) = (line.split() for line in swept.describe().splitlines() if line.split()[:1] == ["point"])
+    (header,) = (
+        line.split() for line in swept.describe().splitlines() if line.split()[:1] == ["point"]
+    )
     assert {"right_facing", "left_facing"} <= {*header}
     assert "velocity" not in header
     assert _legend(swept.figure()) == ["started facing right (up)", "started facing left (down)"]
 
 
-def test_walkers_that_face_down_a_slope_are_a_series_beside_those_that_face_up(tmp_path: Path) -> None:
+def test_walkers_that_face_down_a_slope_are_a_series_beside_those_that_face_up(
+    tmp_path: Path,
+) -> None:
     short = {"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 10}
     (tmp_path / "slope.toml").write_text(to_toml(document(dimers={"replicates": 2}, run=short)))
-    (tmp_path / "tilt.toml").write_text('case = "slope.toml"\n[axes]\nboundary.tilt = ["0 deg", "10 deg", "20 deg"]\n')
+    (tmp_path / "tilt.toml").write_text(
+        'case = "slope.toml"\n[axes]\nboundary.tilt = ["0 deg", "10 deg", "20 deg"]\n'
+    )
     swept = walkers.sweep(tmp_path / "tilt.toml", tmp_path / "runs")
     table, figure = swept.table(), swept.figure()
     assert _legend(figure) == ["started facing right (up)", "started facing left (down)"]
     # Of walkers that lean or turned over, velocities are those up the slope.
     leaning = table.assign(upright=0)
-    each = [walkers.load(Path(run)).walkers.set_index("facing")["axial_velocity"] for run in table["run"]]
+    each = [
+        walkers.load(Path(run)).walkers.set_index("facing")["axial_velocity"]
+        for run in table["run"]
+    ]
     for drawn, label, expected in (
         (figure, "velocity (mm/s)", table[["right_facing", "left_facing"]].to_numpy().T),
-        (figure_of(leaning), "velocity along the drive\naxis (mm/s)", [[one[way] for one in each] for way in (1, -1)]),
+        (
+            figure_of(leaning),
+            "velocity along the drive\naxis (mm/s)",
+            [[one[way] for one in each] for way in (1, -1)],
+        ),
     ):
         (axes,) = _panels(drawn)
         assert axes.get_ylabel() == label

@@ -40,7 +40,9 @@ def make(tmp_path: Path) -> Make:
     (tmp_path / "base.toml").write_text(to_toml(document()))
 
     def expanded(**tables: Any) -> Sweep:
-        return expand({"case": "base.toml", **tables}, source="test.toml", name="test", folder=tmp_path)
+        return expand(
+            {"case": "base.toml", **tables}, source="test.toml", name="test", folder=tmp_path
+        )
 
     return expanded
 
@@ -51,19 +53,37 @@ def _cases(sweep: Sweep) -> list[Case]:
 
 def test_axes_multiply_and_the_last_runs_fastest(make: Make) -> None:
     """Zips and what varies one at a time are axes too, and so is a descent, the last one."""
-    sweep = make(axes={"drive": {"frequency": ["60 Hz", "80 Hz"], "peak_acceleration": ["1 g", "2 g", "4 g"]}})
-    found = [(case.excitation.frequency, case.excitation.peak_acceleration) for case in _cases(sweep)]
+    sweep = make(
+        axes={
+            "drive": {"frequency": ["60 Hz", "80 Hz"], "peak_acceleration": ["1 g", "2 g", "4 g"]}
+        }
+    )
+    found = [
+        (case.excitation.frequency, case.excitation.peak_acceleration) for case in _cases(sweep)
+    ]
     assert found == [(f, pytest.approx(9.8 * a)) for f in (60.0, 80.0) for a in (1, 2, 4)]
     assert [*sweep.units.values()] == ["Hz", "g"]
     assert _cases(sweep)[1].title == "test: drive.frequency = 60 Hz, drive.peak_acceleration = 2 g"
-    alone = make(one_at_a_time={"run.seed": [3, 4], "drive": {"frequency": ["60 Hz", "90 Hz", "70 Hz"]}})
+    alone = make(
+        one_at_a_time={"run.seed": [3, 4], "drive": {"frequency": ["60 Hz", "90 Hz", "70 Hz"]}}
+    )
     assert alone.rows == [(3, "60 Hz"), (4, "60 Hz"), (3, "90 Hz"), (3, "70 Hz")]
     radii = [["0.3 mm", "0.2 mm"], ["0.4 mm", "0.2 mm"]]
-    pairs = make(zip=[{"dimers.radii": radii, "run": {"seed": [3, 4]}}], axes={"drive.frequency": ["60 Hz", "90 Hz"]})
-    cases = [(case.excitation.frequency, case.walkers[0].radii, case.run.seed) for case in _cases(pairs)]
-    assert cases == [(f, r, s) for f in (60.0, 90.0) for r, s in (((3e-4, 2e-4), 3), ((4e-4, 2e-4), 4))]
+    pairs = make(
+        zip=[{"dimers.radii": radii, "run": {"seed": [3, 4]}}],
+        axes={"drive.frequency": ["60 Hz", "90 Hz"]},
+    )
+    cases = [
+        (case.excitation.frequency, case.walkers[0].radii, case.run.seed) for case in _cases(pairs)
+    ]
+    assert cases == [
+        (f, r, s) for f in (60.0, 90.0) for r, s in (((3e-4, 2e-4), 3), ((4e-4, 2e-4), 4))
+    ]
     down = {"from": "0.5 g", "to": "0.2 g", "step": "0.1 g", "until_below": "1 um/s"}
-    falls = make(axes={"drive.frequency": ["60 Hz", "80 Hz"]}, descend={"key": "drive.peak_acceleration", **down})
+    falls = make(
+        axes={"drive.frequency": ["60 Hz", "80 Hz"]},
+        descend={"key": "drive.peak_acceleration", **down},
+    )
     assert [row[1] for row in falls.rows] == ["0.5 g", "0.4 g", "0.3 g", "0.2 g"] * 2
     assert falls.until_below == pytest.approx(1e-6)
 
@@ -74,7 +94,9 @@ def test_linspace_geomspace_and_seeded_samplers_are_those_of_numpy_and_scipy(mak
     numbers = np.array([[float(str(peak).split()[0]), fraction] for peak, fraction in sweep.rows]).T
     expected = np.meshgrid(np.linspace(0.5, 10, 20), np.geomspace(1e-3, 1e-1, 5), indexing="ij")
     np.testing.assert_allclose(numbers, np.reshape(expected, (2, 100)), rtol=1e-11)
-    whole = make(axes={"run.seed": {"linspace": [1, 4, 4]}, "run.cycles": {"geomspace": [10, 40, 3]}})
+    whole = make(
+        axes={"run.seed": {"linspace": [1, 4, 4]}, "run.cycles": {"geomspace": [10, 40, 3]}}
+    )
     assert whole.rows == [(seed, cycles) for seed in (1, 2, 3, 4) for cycles in (10, 20, 40)]
     ranges = {
         "contact.friction.bead_wall": {"uniform": [0.05, 0.3]},
@@ -85,8 +107,15 @@ def test_linspace_geomspace_and_seeded_samplers_are_those_of_numpy_and_scipy(mak
         unit = qmc.Sobol(d=2, rng=np.random.default_rng(seed)).random(8)
         expected = np.stack([0.05 + 0.25 * unit[:, 0], 1e-3 * 100 ** unit[:, 1]], axis=1)
         np.testing.assert_allclose(np.array(sweep.rows, dtype=float), expected, rtol=1e-11)
-    cases = _cases(make(sample=[{"points": 4, "ranges": {"dimers.radii[0]": {"uniform": ["0.3 mm", "0.4 mm"]}}}]))
-    assert all(3e-4 <= case.walkers[0].radii[0] <= 4e-4 and case.walkers[0].radii[1] == 2e-4 for case in cases)
+    cases = _cases(
+        make(
+            sample=[{"points": 4, "ranges": {"dimers.radii[0]": {"uniform": ["0.3 mm", "0.4 mm"]}}}]
+        )
+    )
+    assert all(
+        3e-4 <= case.walkers[0].radii[0] <= 4e-4 and case.walkers[0].radii[1] == 2e-4
+        for case in cases
+    )
 
 
 def test_a_key_that_says_the_same_in_other_words_gives_way(make: Make) -> None:
@@ -102,11 +131,21 @@ def test_shipped_sweeps_are_the_papers() -> None:
     assert {case.excitation.frequency for case in fig2} == {60.0, 70.0, 80.0, 90.0}
     accelerations = {round(case.excitation.peak_acceleration / 9.8, 9) for case in fig2}
     assert (min(accelerations), max(accelerations)) == (0.5, 10.0)
-    fig3 = [(dimer_of(case), case.excitation.peak_acceleration) for case in load_sweep("fig3").cases()]
-    assert [round(dimer.sin_delta, 3) for dimer, _ in fig3] == [0.0, 0.111, 0.143, 0.2, 0.273, 0.333]
+    fig3 = [
+        (dimer_of(case), case.excitation.peak_acceleration) for case in load_sweep("fig3").cases()
+    ]
+    assert [round(dimer.sin_delta, 3) for dimer, _ in fig3] == [
+        0.0,
+        0.111,
+        0.143,
+        0.2,
+        0.273,
+        0.333,
+    ]
     assert all(dimer.gamma0(peak) == pytest.approx(0.5) for dimer, peak in fig3)
     trays = [
-        (one.walkers[0].replicates, meetings.derived(one)["coverage"]) for one in _cases(load_sweep("tray-phases"))
+        (one.walkers[0].replicates, meetings.derived(one)["coverage"])
+        for one in _cases(load_sweep("tray-phases"))
     ]
     numbers, coverages = map(set, zip(*trays, strict=True))
     assert (len(trays), numbers, coverages) == (96, {2, 16, 64}, {0.05, 0.14, 0.25})
@@ -149,19 +188,30 @@ BAD: list[tuple[dict[str, Any], str]] = [
 def test_a_sweep_that_makes_no_sense(make: Make, tables: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=f"test.toml: .*{message}") as caught:
         make(**tables)
-    assert any(word in str(caught.value) for word in ("expected", "unknown key", "nor a shipped case", "must "))
+    assert any(
+        word in str(caught.value)
+        for word in ("expected", "unknown key", "nor a shipped case", "must ")
+    )
 
 
 @pytest.mark.parametrize("case", ["other", "other.toml", "./other"])
-def test_the_base_case_beside_a_sweep_comes_before_that_of_the_working_directory(case: str, in_folder: Path) -> None:
+def test_the_base_case_beside_a_sweep_comes_before_that_of_the_working_directory(
+    case: str, in_folder: Path
+) -> None:
     (in_folder / "below").mkdir()
     for place, acceleration in (("other.toml", "2 g"), ("below/other.toml", "3 g")):
         (in_folder / place).write_text(to_toml(document(drive={"peak_acceleration": acceleration})))
     (in_folder / "below" / "sweep.toml").write_text(f'case = "{case}"\naxes.run.seed = [1]\n')
-    assert [point.drive.peak_acceleration for point in load_sweep("below/sweep.toml").cases()] == [pytest.approx(29.4)]
+    assert [point.drive.peak_acceleration for point in load_sweep("below/sweep.toml").cases()] == [
+        pytest.approx(29.4)
+    ]
 
 
-FRICTION, RESTITUTION, ROLLING = "contact.friction.bead_wall", "contact.restitution", "contact.rolling_friction"
+FRICTION, RESTITUTION, ROLLING = (
+    "contact.friction.bead_wall",
+    "contact.restitution",
+    "contact.rolling_friction",
+)
 UNCERTAIN = {FRICTION: [0.05, 0.3], RESTITUTION: [0.2, 0.8], ROLLING: [0.0, 0.01]}
 
 
@@ -179,10 +229,14 @@ def test_a_spread_has_the_quantiles_and_the_signed_ranks_of_its_draws() -> None:
     number = np.arange(32)
     speeds = 1e-4 * 1.2**number - 5e-4
     strong, weak = _with_rank(number, 1, 0.55, 0.6), _with_rank(number, 2, 0.25, 0.3)
-    whole = pd.DataFrame({"velocity": speeds, FRICTION: 0.3 - 0.005 * number, RESTITUTION: strong, ROLLING: weak})
+    whole = pd.DataFrame(
+        {"velocity": speeds, FRICTION: 0.3 - 0.005 * number, RESTITUTION: strong, ROLLING: weak}
+    )
     whole["status"], whole["separated_fraction"] = "finished", 0.0
     others = pd.DataFrame({"velocity": [1.0, -1.0, 2.0], "separated_fraction": [0.5, 0.2, 0.0]})
-    others = others.assign(status=["finished", "finished", "failed"], **dict.fromkeys(UNCERTAIN, 0.2))
+    others = others.assign(
+        status=["finished", "finished", "failed"], **dict.fromkeys(UNCERTAIN, 0.2)
+    )
     table = pd.concat([whole, others]).sample(frac=1.0, random_state=1).reset_index(drop=True)
     spread = spread_in(table, make_case(uncertain=UNCERTAIN), Path())
     band = spread.bands["velocity"]
@@ -208,7 +262,9 @@ def test_bands_along_a_sweep_are_those_of_each_points_spread(tmp_path: Path) -> 
     sweep = walkers.sweep(tables, tmp_path, spread=4)
     table = sweep.table()
     for row in table.itertuples():
-        spread = read_json(spread_of(tmp_path / Path(row.run).name) / SPREAD_NAME)["bands"]["velocity"]
+        spread = read_json(spread_of(tmp_path / Path(row.run).name) / SPREAD_NAME)["bands"][
+            "velocity"
+        ]
         assert row.velocity_low == min(spread["low"], row.velocity)
         assert row.velocity_high == max(spread["high"], row.velocity)
         assert row.velocity_low < row.velocity_high
@@ -216,13 +272,18 @@ def test_bands_along_a_sweep_are_those_of_each_points_spread(tmp_path: Path) -> 
     assert "velocity_low (mm/s)  velocity_high (mm/s)" in sweep.describe()
     figure = sweep.figure()
     band = "band: uncertain values only, 5 to 95 % of 4 draws, approximate"
-    assert " ".join(figure.get_suptitle().split()).endswith(f"{band}; the error of the model is not in it")
+    assert " ".join(figure.get_suptitle().split()).endswith(
+        f"{band}; the error of the model is not in it"
+    )
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [band]
 
 
 def test_points_that_differ_in_their_seed_alone_are_a_group() -> None:
     """A law that a case may leave to the program ("auto", none) is a value as others."""
-    values = {"drive.frequency": [90.0, 60.0] * 3, "contact.law": ["auto", 1.0, "auto", None, "auto", None]}
+    values = {
+        "drive.frequency": [90.0, 60.0] * 3,
+        "contact.law": ["auto", 1.0, "auto", None, "auto", None],
+    }
     table = pd.DataFrame({**values, "run.seed": [1, 1, 2, 1, 3, 2], "boundary.tilt": 0.0})
     table.attrs["varied"] = list(table)
     found = [(named, list(rows.index)) for named, rows in groups(table)]
@@ -232,7 +293,9 @@ def test_points_that_differ_in_their_seed_alone_are_a_group() -> None:
     assert (named, list(rows.index), rows.attrs["varied"]) == ({}, [0, 2, 4], list(table))
 
 
-def test_a_key_may_be_a_word_at_some_points_and_a_list_at_others(make: Make, tmp_path: Path) -> None:
+def test_a_key_may_be_a_word_at_some_points_and_a_list_at_others(
+    make: Make, tmp_path: Path
+) -> None:
     sweep = make(axes={"drive": {"axis": ["x", "y", [1, 0, 1]]}})
     record = SweepRecord(tmp_path / "test", sweep, [f"base-{number:012d}" for number in range(3)])
     table = table_of(record).frame
@@ -245,7 +308,12 @@ def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives() -> None:
     speeds = [[-3e-4, -1e-4, 1e-6], [2e-4, -1e-6, 2e-5]]
     dimer = dimer_of(make_case())
     rows = [
-        {"point": 5 * descent + step, "drive.frequency": 60.0 + 30.0 * descent, "velocity": speed, "status": "finished"}
+        {
+            "point": 5 * descent + step,
+            "drive.frequency": 60.0 + 30.0 * descent,
+            "velocity": speed,
+            "status": "finished",
+        }
         for descent, of in enumerate(speeds)
         for step, speed in enumerate(of)
     ]
@@ -259,7 +327,10 @@ def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives() -> None:
     for row, moving, at_rest in ((first, 1.0, 0.8), (second, 1.2, 1.0)):
         assert (row["moving"], row["at_rest"]) == pytest.approx((moving, at_rest))
         # Γ0 = M a0/4πγR̄ is proportional to the drive.
-        mass, force = 4000.0 * 4.0 / 3.0 * np.pi * (0.3e-3**3 + 0.2e-3**3), 4.0 * np.pi * 19.2e-3 * 0.25e-3
+        mass, force = (
+            4000.0 * 4.0 / 3.0 * np.pi * (0.3e-3**3 + 0.2e-3**3),
+            4.0 * np.pi * 19.2e-3 * 0.25e-3,
+        )
         expected = [mass * 9.80665 * g / force for g in (moving, at_rest)]
         assert [row["gamma0_moving"], row["gamma0_at_rest"]] == pytest.approx(expected, rel=0.05)
         assert row["gamma0_moving"] / row["gamma0_at_rest"] == pytest.approx(moving / at_rest)
@@ -269,30 +340,49 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     """Glass on polystyrene at 10 g walks or not as one guesses; the single number, exact to 1e-5, does not say so."""
     case = build_case({**GLASS, "run": {"cycles": 6}}, name="guessed")
     spread = run_spread(case, runs_folder, Options(2), points=4)
-    warned = [run.result.warnings for run in walkers.load(spread.directory).runs if run.result.warnings]
+    warned = [
+        run.result.warnings for run in walkers.load(spread.directory).runs if run.result.warnings
+    ]
     assert warned == list(spread.doubts)
     told = describe(replace(spread, doubts=[["one", "two"], ["three"]]))
     assert "warning  2 draws with warnings, first: one\n" in told
-    rough = {"contact.roughness.bead_bead", "contact.roughness.bead_wall"}  # of the library, for these materials
-    assert {one.key for one in spread.varied} == {one.key for one in case.origins if one.guessed} | rough
+    rough = {
+        "contact.roughness.bead_bead",
+        "contact.roughness.bead_wall",
+    }  # of the library, for these materials
+    assert {one.key for one in spread.varied} == {
+        one.key for one in case.origins if one.guessed
+    } | rough
     given = {"contact.friction.bead_bead", "contact.rolling_friction"}
-    liquid = {f"liquid.{name}" for name in ("name", "surface_tension", "density", "kinematic_viscosity")}
+    liquid = {
+        f"liquid.{name}" for name in ("name", "surface_tension", "density", "kinematic_viscosity")
+    }
     assert {one.key for one in spread.held} == given | liquid
     text = describe(spread)
     assert "contact_angle 0 deg (0 deg to 60 deg)" in text
-    assert "liquid.kinematic_viscosity 14.5 mm^2/s (ethylene glycol), contact." in " ".join(text.split())
+    assert "liquid.kinematic_viscosity 14.5 mm^2/s (ethylene glycol), contact." in " ".join(
+        text.split()
+    )
     assert text.count("median") == 1  # of the result
     table = walkers.load(spread.directory).table()
     assert table["contact.friction.bead_wall"].between(0.1, 0.6).all()
-    assert (table["liquid.volume_fraction"] > 0.01).sum() == 2  # half of the draws: the case's own is the median
-    assert (table["liquid.contact_angle"] == 0.0).sum() == 2  # its own is the end of what is possible
+    assert (
+        table["liquid.volume_fraction"] > 0.01
+    ).sum() == 2  # half of the draws: the case's own is the median
+    assert (
+        table["liquid.contact_angle"] == 0.0
+    ).sum() == 2  # its own is the end of what is possible
     assert sum(spread.counts.values()) == 4
     # The headline has the band from now on, which holds it.
     done, band = walkers.run(case, runs_folder), spread.bands["velocity"]
     # The report shows the figure; no draw keeps what only pictures read, and a picture says how to get it.
     page = done.report().read_text("utf-8")
     assert 'aria-label="spread"' in page
-    for text in ("4 draws: too few for rank correlations", "4 draws, approximate", held_text(spread.held)):
+    for text in (
+        "4 draws: too few for rank correlations",
+        "4 draws, approximate",
+        held_text(spread.held),
+    ):
         assert text in page
     assert "rank correlation " not in page
     assert list(done.directory.rglob("beads.bin"))
@@ -307,13 +397,20 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     assert f"band {band_text(*ends, 'm/s')} (4 draws, approximate)" in done.describe()
     told = {one["key"]: one["origin"] for one in done.result.about["rests_on"]}
     assert told["contact.friction.bead_wall"] == "given"
-    assert told.keys() == unmeasured().keys() - {"liquid.meniscus_radius"}  # in place of which there is a fraction
+    assert told.keys() == unmeasured().keys() - {
+        "liquid.meniscus_radius"
+    }  # in place of which there is a fraction
     # It is for its ranges alone, with which a run does not change its name.
     done = walkers.run(
-        build_case({**case.document, "uncertain": {"contact.friction.bead_wall": [0.2, 0.6]}}), runs_folder
+        build_case({**case.document, "uncertain": {"contact.friction.bead_wall": [0.2, 0.6]}}),
+        runs_folder,
     )
     assert "velocity_low" not in done.result
-    with pytest.raises(InputError, match=r"uncertain.contact.restitution.*: expected a range that holds"):
-        spread_sweep(build_case({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside"))
+    with pytest.raises(
+        InputError, match=r"uncertain.contact.restitution.*: expected a range that holds"
+    ):
+        spread_sweep(
+            build_case({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside")
+        )
     with pytest.raises(InputError, match="no value is uncertain"):
         run_spread(build_case(REFERENCE), runs_folder, Options(2))

@@ -63,7 +63,9 @@ def _centres(deck: Deck) -> list[tuple[float, ...]]:
     return [tuple(map(float, line.split()[4:7])) for line in atoms.splitlines()]
 
 
-def test_beads_from_a_file_are_those_that_commands_create(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_beads_from_a_file_are_those_that_commands_create(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The engine's dumps are the same bytes, of beads of two sizes that fall and are shaken."""
     dumps = []
     for most_created in (19, 20):
@@ -79,7 +81,10 @@ def test_beads_from_a_file_are_those_that_commands_create(tmp_path: Path, monkey
 
 def test_beads_of_a_file_may_have_densities_of_their_own() -> None:
     """Id, type, diameter (m), density (kg/m³), centre (m); 4000 kg/m³ for beads without their own."""
-    beads = (Bead(1, (0.0, 0.0, 1e-3), 1e-3), Bead(2, (0.0, 3e-3, 1e-3), 1e-3, surface=2, density=2500.0))
+    beads = (
+        Bead(1, (0.0, 0.0, 1e-3), 1e-3),
+        Bead(2, (0.0, 3e-3, 1e-3), 1e-3, surface=2, density=2500.0),
+    )
     scene = Scene(beads, (), (-1.0, -1.0, 0.0), (1.0, 1.0, 1.0))
     atoms = _beads_data(scene, 4000.0, types=3).partition("Atoms\n\n")[2].splitlines()[:2]
     assert atoms == ["1 1 0.002 4000.0 0.0 0.0 0.001", "2 2 0.002 2500.0 0.0 0.003 0.001"]
@@ -92,9 +97,17 @@ def test_walkers_are_not_sorted_and_piles_are() -> None:
 
 @pytest.mark.parametrize(
     ("ranks", "width", "depth", "grid"),
-    [(1, 1.0, 1.0, (1, 1)), (2, 1.0, 1.0, (2, 1)), (2, 1.0, 3.0, (1, 2)), (4, 1.0, 1.0, (2, 2)), (6, 6.0, 1.0, (6, 1))],
+    [
+        (1, 1.0, 1.0, (1, 1)),
+        (2, 1.0, 1.0, (2, 1)),
+        (2, 1.0, 3.0, (1, 2)),
+        (4, 1.0, 1.0, (2, 2)),
+        (6, 6.0, 1.0, (6, 1)),
+    ],
 )
-def test_ranks_form_a_grid_with_short_cuts(ranks: int, width: float, depth: float, grid: tuple[int, int]) -> None:
+def test_ranks_form_a_grid_with_short_cuts(
+    ranks: int, width: float, depth: float, grid: tuple[int, int]
+) -> None:
     plan = plan_of(load_case("pile-ci"))
     box = replace(plan.scene, lower=(0.0, 0.0, 0.0), upper=(width, depth, 9.0))
     assert processor_grid(replace(plan, scene=box, ranks=ranks)) == grid
@@ -131,7 +144,9 @@ def test_parameters_of_a_deck_have_si_units(drive: dict[str, str], more: dict[st
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("axis", [0, 1])
-def test_the_box_of_a_deck_has_room_for_beads_that_are_placed_far_from_the_origin(axis: int, sign: int) -> None:
+def test_the_box_of_a_deck_has_room_for_beads_that_are_placed_far_from_the_origin(
+    axis: int, sign: int
+) -> None:
     place_of_bead = [0.0, 0.0, 0.5]
     place_of_bead[axis] = 30.0 * sign
     at = [f"{coordinate} mm" for coordinate in place_of_bead]
@@ -147,16 +162,26 @@ def test_the_box_of_a_deck_has_room_for_beads_that_are_placed_far_from_the_origi
 
 def test_a_mixture_is_placed_by_its_seed() -> None:
     pile = load_case("pile-ci")
-    places = [[bead.centre for bead in place((pile.put("run.seed", seed),))[0].beads] for seed in (1, 1, 2)]
+    places = [
+        [bead.centre for bead in place((pile.put("run.seed", seed),))[0].beads]
+        for seed in (1, 1, 2)
+    ]
     assert places[0] == places[1] != places[2]
 
 
 def test_bridges_may_push_loose_beads_and_have_no_viscosity() -> None:
-    few = {"mixture.small": ["0.3 mm"] * 2, "mixture.large": ["0.545 mm"] * 2}  # radii, and so tables
-    pile, less = (load_case("pile-ci", {"liquid.contact_angle": f"{angle} deg", **few}) for angle in (90, 84))
+    few = {
+        "mixture.small": ["0.3 mm"] * 2,
+        "mixture.large": ["0.545 mm"] * 2,
+    }  # radii, and so tables
+    pile, less = (
+        load_case("pile-ci", {"liquid.contact_angle": f"{angle} deg", **few}) for angle in (90, 84)
+    )
     assert render_deck(pile).fastest > render_deck(less).fastest
     tables = render_deck(make_case(liquid={"viscosity_ratio": 0})).files["bridges.txt"].splitlines()
-    resistances = [[float(number) for number in line.split()[2:]] for line in tables if line[0] in "0123456789"]
+    resistances = [
+        [float(number) for number in line.split()[2:]] for line in tables if line[0] in "0123456789"
+    ]
     assert len(resistances) > 100
     assert not any(map(any, resistances))
 
@@ -168,14 +193,18 @@ CONTENT = {10: "475ccccd48ea42bd"}
 def _reads(deck: Deck) -> str:
     """The commands and files of a deck; numbers to fewer digits than what other machines' arithmetic leaves alone."""
     commands = _rounded("\n".join(line.partition("#")[0] for line in deck.text.splitlines()), 9)
-    files = (f"{name} {_rounded(text, 6)}" for name, text in deck.files.items())  # many: one may be close to a half
+    files = (
+        f"{name} {_rounded(text, 6)}" for name, text in deck.files.items()
+    )  # many: one may be close to a half
     return " ".join([commands, *files])
 
 
 @cache
 def _rounded(text: str, digits: int) -> str:
     number = re.compile(r"[-+.\de]*\d[-+.\de]*")
-    return " ".join(f"{float(word):.{digits}g}" if number.fullmatch(word) else word for word in text.split())
+    return " ".join(
+        f"{float(word):.{digits}g}" if number.fullmatch(word) else word for word in text.split()
+    )
 
 
 def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
@@ -183,26 +212,39 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
 
     If this fails and the decks are meant to have changed: raise `CONTENT_VERSION`, write it and its digest down.
     """
-    harmonics = [{"frequency": "80 Hz", "peak_acceleration": "4 g", "axis": [1, 0, 1], "phase": "30 deg"}]
+    harmonics = [
+        {"frequency": "80 Hz", "peak_acceleration": "4 g", "axis": [1, 0, 1], "phase": "30 deg"}
+    ]
     several = document(contact={"rolling_friction": 0.01}, boundary={"tilt": "20 deg"})
-    several["drive"] = {"harmonics": [*harmonics, {"frequency": "120 Hz", "peak_acceleration": "1 g"}]}
+    several["drive"] = {
+        "harmonics": [*harmonics, {"frequency": "120 Hz", "peak_acceleration": "1 g"}]
+    }
     thick = {"liquid": {"viscosity_ratio": 2.0}, "dimers": {"replicates": 3, "angle": "10 deg"}}
     decks = [render_deck(case) for case in (make_case(), make_case(**thick), build_case(several))]
-    decks += [render_deck(make_case(**thick, drive={"frame": "lab", "axis": axis})) for axis in "xyz"]
+    decks += [
+        render_deck(make_case(**thick, drive={"frame": "lab", "axis": axis})) for axis in "xyz"
+    ]
     shared = [
         make_case(),
         make_case(contact={"restitution": 0.6}, run={"seed": 2}),
-        make_case(**thick, drive={"peak_acceleration": "2 g", "axis": "y"}, boundary={"tilt": "20 deg"}),
+        make_case(
+            **thick, drive={"peak_acceleration": "2 g", "axis": "y"}, boundary={"tilt": "20 deg"}
+        ),
     ]
     decks += [compose(plan_of(*shared[:2])), compose(plan_of(*shared))]
     piles = [load_case("pile-ci"), load_case("cluster")]
     square = piles[0].boundary
-    round_one = Boundary(shape="cylinder", material=square.material, width=square.width, height=square.height)
+    round_one = Boundary(
+        shape="cylinder", material=square.material, width=square.width, height=square.height
+    )
     piles += [piles[0].put("run.ranks", 2), piles[0].but(boundary=round_one)]
     for case in piles:
         settled = settling_steps(case)
         end = settled + case.run.cycles_per_segment * case.run.steps_per_cycle
-        decks += [render_deck(case, Segment(0, settled, None)), render_deck(case, Segment(settled, end, settled))]
+        decks += [
+            render_deck(case, Segment(0, settled, None)),
+            render_deck(case, Segment(settled, end, settled)),
+        ]
     digest = sha256("\n".join(map(_reads, decks)).encode()).hexdigest()[:16]
     assert {CONTENT_VERSION: digest} == CONTENT
 
@@ -216,8 +258,12 @@ def test_the_engine_reads_the_law_out_of_its_table(name: str, other: float) -> N
     gaps = table.curve.rupture * np.random.default_rng(1).random(200) ** 3
     expected = law(given).forces(gaps).columns()
     scale = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max(axis=0))
-    read = RecordedLaw(f"\nbridge 1 1 {given.radius!r} {given.other_radius!r}\n{table.text()}", None)(given)
-    np.testing.assert_array_less(np.abs(read.forces(gaps).columns() - expected), 20 * TOLERANCE * scale + 1e-30)
+    read = RecordedLaw(
+        f"\nbridge 1 1 {given.radius!r} {given.other_radius!r}\n{table.text()}", None
+    )(given)
+    np.testing.assert_array_less(
+        np.abs(read.forces(gaps).columns() - expected), 20 * TOLERANCE * scale + 1e-30
+    )
 
 
 @pytest.mark.parametrize("shared", [False, True])
@@ -235,7 +281,10 @@ def test_a_run_shows_and_exports_the_law_that_it_recorded(in_folder: Path, share
     deck = call("export", str(run), "--to", "deck", "-o", "deck", check=True)
     assert "executes" not in expected.stderr + deck.stderr
     assert expected.stdout.count("40 µN") == 3
-    tables = [re.findall(r"(?m)^\d.*", (folder / "bridges.txt").read_text()) for folder in (Path("deck"), run)]
+    tables = [
+        re.findall(r"(?m)^\d.*", (folder / "bridges.txt").read_text())
+        for folder in (Path("deck"), run)
+    ]
     for one, other in zip(*tables, strict=True) if not shared else ():
         assert [*map(float, one.split())] == pytest.approx([*map(float, other.split())], rel=1e-5)
     law.write_text(OWN.replace("4e-5", "9e-5"))

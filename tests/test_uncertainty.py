@@ -46,20 +46,28 @@ def test_what_is_usual_lies_within_its_range() -> None:
     for entry in catalogue():
         if entry.kind == "surface pairs":
             known = {key: one for key, one in entry.numbers.items() if one.range}
-            numbers |= {f"contact.{key} of {entry.name}": (one, one.range) for key, one in known.items()}
+            numbers |= {
+                f"contact.{key} of {entry.name}": (one, one.range) for key, one in known.items()
+            }
     assert len(numbers) > 10
     for key, (known, ends) in numbers.items():
         assert known is not None
         assert ends is not None
         kind = kind_of(key.partition(" of ")[0].replace("contact.meniscus", "liquid.meniscus"))
-        value, low, high = (parse_quantity(one, kind) if kind else one for one in (known.written, *ends))
+        value, low, high = (
+            parse_quantity(one, kind) if kind else one for one in (known.written, *ends)
+        )
         assert low < value < high or (key == "liquid.contact_angle" and value == low == 0.0), key
 
 
 SLOPE: dict[str, Any] = {
     "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2},
     "beads": {"material": "ruby"},
-    "liquid": {"surface_tension": "20 mN/m", "kinematic_viscosity": "5 mm^2/s", "density": "0.9 g/cm^3"},
+    "liquid": {
+        "surface_tension": "20 mN/m",
+        "kinematic_viscosity": "5 mm^2/s",
+        "density": "0.9 g/cm^3",
+    },
     "boundary": {"material": "glass", "tilt": "20 deg"},
     "drive": {"frequency": "80 Hz", "peak_acceleration": "4 g"},
     "contact": {"rolling_friction": 0.0},
@@ -83,7 +91,9 @@ def test_walkers_that_face_up_and_down_a_slope_differ(steep: walkers.Run) -> Non
     assert np.isnan([result["right_scatter"], result["left_scatter"]]).all()
 
 
-def test_a_slope_is_in_the_headline_of_a_run_and_of_its_report(steep: walkers.Run, tmp_path: Path) -> None:
+def test_a_slope_is_in_the_headline_of_a_run_and_of_its_report(
+    steep: walkers.Run, tmp_path: Path
+) -> None:
     assert "plane tilted by 20°, right is up" in steep.describe()
     assert "plane tilted by 20°" in steep.report(tmp_path / "report.html").read_text("utf-8")
 
@@ -103,19 +113,27 @@ def test_the_printed_result_of_a_slope_has_the_velocities_of_both_ways(steep: wa
 
 
 def test_the_inventory_has_the_velocities_of_both_ways(steep: walkers.Run) -> None:
-    up, down = (rounded(1e3 * steep.result[name], "mm/s") for name in ("right_facing", "left_facing"))
-    assert f" {up} mm/s facing up, {down} facing down " in as_text(inventory(steep.directory.parent))
+    up, down = (
+        rounded(1e3 * steep.result[name], "mm/s") for name in ("right_facing", "left_facing")
+    )
+    assert f" {up} mm/s facing up, {down} facing down " in as_text(
+        inventory(steep.directory.parent)
+    )
 
 
 @pytest.mark.parametrize(("name", "shown"), [("right_facing", True), ("velocity", False)])
-def test_on_a_slope_the_band_of_a_spread_is_that_of_one_way(steep: walkers.Run, name: str, shown: bool) -> None:
+def test_on_a_slope_the_band_of_a_spread_is_that_of_one_way(
+    steep: walkers.Run, name: str, shown: bool
+) -> None:
     """It is widened to the result of the case itself; that of the mean over both ways is not printed."""
     own = steep.result["right_facing"]
     spread = spread_of(steep.directory.resolve())
     spread.mkdir()
     try:
         band = {"low": own - 1e-3, "high": own - 1e-4, "points": 64}
-        write_json(spread / SPREAD_NAME, {"varied": steep.result.about["rests_on"], "bands": {name: band}})
+        write_json(
+            spread / SPREAD_NAME, {"varied": steep.result.about["rests_on"], "bands": {name: band}}
+        )
         assert (steep.result[f"{name}_low"], steep.result[f"{name}_high"]) == (own - 1e-3, own)
         errors = {row.name: row.error for row in rows(steep.result)}
         assert errors["right_facing"].endswith("(64 draws)") == shown
@@ -123,7 +141,9 @@ def test_on_a_slope_the_band_of_a_spread_is_that_of_one_way(steep: walkers.Run, 
         shutil.rmtree(spread)
 
 
-def test_slopes_are_compared_by_the_walkers_that_face_up(steep: walkers.Run, tmp_path: Path) -> None:
+def test_slopes_are_compared_by_the_walkers_that_face_up(
+    steep: walkers.Run, tmp_path: Path
+) -> None:
     tables = {**SLOPE, "boundary": {"material": "glass", "tilt": "10 deg"}}
     gentle = walkers.run(build_case(tables, name="gentle"), tmp_path)
     text = walkers.compare(steep.directory, gentle.directory).text
@@ -136,7 +156,11 @@ def test_the_main_number_of_points_depends_on_what_their_walkers_do(steep: walke
     result = dict(steep.result)
     level = {**result, "facings_differ": False}
     turned = {**result, "turned_round": 1, "upright": 1, "turned_over": 1}
-    for points, column in (([result], "right_facing"), ([level], "velocity"), ([result, turned], "axial_velocity")):
+    for points, column in (
+        ([result], "right_facing"),
+        ([level], "velocity"),
+        ([result, turned], "axial_velocity"),
+    ):
         assert default_column(pd.DataFrame(points)) == column
         assert headline(points[-1]) == column
 
@@ -157,7 +181,9 @@ def test_the_final_angle_is_printed_unless_some_walkers_turned_over(steep: walke
         assert errors["orientation_end"] == expected
 
 
-def test_clusters_on_a_slope_are_averaged_by_the_way_they_face_and_lean_by_how_far_they_turned(tmp_path: Path) -> None:
+def test_clusters_on_a_slope_are_averaged_by_the_way_they_face_and_lean_by_how_far_they_turned(
+    tmp_path: Path,
+) -> None:
     """Not by the angle between the way that they face and their beads in front, which the arrangement contains."""
     steep = {**FOUR_BEADS, "boundary": {"material": "glass", "tilt": "30 deg"}}
     done = walkers.run(build_case(steep, name="four"), tmp_path)
@@ -168,9 +194,13 @@ def test_clusters_on_a_slope_are_averaged_by_the_way_they_face_and_lean_by_how_f
     assert result["velocity"] == pytest.approx(up["velocity"].mean())
     assert result["axial_velocity"] == pytest.approx(up["axial_velocity"].mean())
     assert result["axial_left_facing"] == pytest.approx(down["axial_velocity"].mean())
-    np.testing.assert_allclose(done.trajectory.groupby("walker")["orientation"].first(), each["start_angle"], atol=2e-3)
+    np.testing.assert_allclose(
+        done.trajectory.groupby("walker")["orientation"].first(), each["start_angle"], atol=2e-3
+    )
     heading = read_motion(done.directory).groups[0].heading[[0, -1]]
-    turned = np.abs(np.diff(np.unwrap(np.arctan2(heading[..., 1], heading[..., 0]), axis=0), axis=0))
+    turned = np.abs(
+        np.diff(np.unwrap(np.arctan2(heading[..., 1], heading[..., 0]), axis=0), axis=0)
+    )
     assert result["ends_within"] == pytest.approx(turned.max(), abs=np.radians(2.0))
 
 
@@ -194,7 +224,9 @@ FOUR_BEADS = {
 """A cluster whose beads in front are 13° beside the way that it faces."""
 
 
-def test_walkers_that_came_apart_have_no_velocity_and_are_not_steady_anywhere_in_the_text(runs_folder: Path) -> None:
+def test_walkers_that_came_apart_have_no_velocity_and_are_not_steady_anywhere_in_the_text(
+    runs_folder: Path,
+) -> None:
     done = walkers.run(load_case("fig1b"), runs_folder)
     columns = read_columns(done.directory, "walkers")
     columns["separated_fraction"] = columns["separated_fraction"] + 0.5
@@ -212,7 +244,10 @@ def test_what_is_not_computed_stands_right_below_the_head_of_a_result(runs_folde
     """Six values of Fig. 1b have a range; no option has been used."""
     done = walkers.run(load_case("fig1b"), runs_folder)
     lines = done.describe().splitlines()
-    assert lines[1] == "  uncertainty not computed: 6 uncertain values (--spread), numerical error (--accuracy)"
+    assert (
+        lines[1]
+        == "  uncertainty not computed: 6 uncertain values (--spread), numerical error (--accuracy)"
+    )
     assert not_computed(done.result) == NotComputed(uncertain_values=6, numerical_error=True)
 
 
@@ -227,7 +262,12 @@ def test_a_band_tells_that_it_leaves_out_the_error_of_the_model(runs_folder: Pat
     note = "of uncertain values only; the error of the model is not in it"
     assert note not in done.describe()
     result = done.result
-    result |= {"velocity_low": 1e-3, "velocity_high": 3e-3, "velocity_draws": 32, "velocity_approximate": False}
+    result |= {
+        "velocity_low": 1e-3,
+        "velocity_high": 3e-3,
+        "velocity_draws": 32,
+        "velocity_approximate": False,
+    }
     described = text(result)
     assert note in described
     assert "uncertain values (--spread)" not in described
@@ -243,7 +283,9 @@ def test_a_result_that_depends_on_the_start_says_so(runs_folder: Path) -> None:
         changed = {**columns, "velocity": np.where(faster, 1.4, 1.0) * columns["velocity"]}
         numbers = _velocities(changed, done.case)
         assert numbers["depends_on_start"]
-        assert not _velocities({**changed, "steady": ~columns["steady"]}, done.case)["depends_on_start"]
+        assert not _velocities({**changed, "steady": ~columns["steady"]}, done.case)[
+            "depends_on_start"
+        ]
 
 
 ROOT = Path(__file__).parent.parent
@@ -254,11 +296,15 @@ PAIR = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2}
 def changed(case: Case, shorter: float, harder: float) -> Case:
     """A case with a part of its time step and a multiple of its modulus."""
     step, modulus = 1e6 * case.run.time_step * shorter, 1e-6 * case.contact.youngs_modulus * harder
-    return changed_case(case, {"run.time_step": f"{step!r} us", "contact.youngs_modulus": f"{modulus!r} MPa"})
+    return changed_case(
+        case, {"run.time_step": f"{step!r} us", "contact.youngs_modulus": f"{modulus!r} MPa"}
+    )
 
 
 @pytest.mark.slow
-def test_the_error_is_the_distance_from_far_harder_beads_at_a_far_smaller_step(tmp_path: Path) -> None:
+def test_the_error_is_the_distance_from_far_harder_beads_at_a_far_smaller_step(
+    tmp_path: Path,
+) -> None:
     """100 times as hard, at half the step that the modulus allows: within the share that was asked for."""
     case = load_case("fig1b", {"drive.frequency": "90 Hz", "drive.peak_acceleration": "10 g"})
     done, reference = (walkers.run(one, tmp_path) for one in (case, changed(case, 0.05, 100.0)))
@@ -278,19 +324,31 @@ def test_the_error_is_the_distance_from_far_harder_beads_at_a_far_smaller_step(t
     assert done.result["velocity_error"] == done.result["numerical_error"] == error["total"]
     speeds = walkers.load(tmp_path / found["sweep"]).table()["velocity"]
     cells = " | ".join(f"{1e3 * one:.3f}" for one in (own, *speeds[1:]))
-    assert f"| `fig1b`, 10 g and 90 Hz | {cells} |" in (ROOT / "docs/explanation/physics.md").read_text("utf-8")
-    assert declared("rotation_2_error").label == "rotation of bead 2, numerical error"  # also in the table of a sweep
-    assert ordered(["sliding_1", "rotation_2_error", "velocity"]) == ["velocity", "rotation_2_error", "sliding_1"]
+    assert f"| `fig1b`, 10 g and 90 Hz | {cells} |" in (
+        ROOT / "docs/explanation/physics.md"
+    ).read_text("utf-8")
+    assert (
+        declared("rotation_2_error").label == "rotation of bead 2, numerical error"
+    )  # also in the table of a sweep
+    assert ordered(["sliding_1", "rotation_2_error", "velocity"]) == [
+        "velocity",
+        "rotation_2_error",
+        "sliding_1",
+    ]
     (row,) = (row for row in rows(done.result) if row.name == "velocity")
     assert f"numerical error {1e3 * error['total']:.2g}" in row.error
     assert row.error in done.describe()
-    assert f"\n{done.directory.name} " in call("list", "--out", str(tmp_path), check=True).stdout  # beside the sweep
+    assert (
+        f"\n{done.directory.name} " in call("list", "--out", str(tmp_path), check=True).stdout
+    )  # beside the sweep
     with ZipFile(done.export("archive", tmp_path / "run.zip")) as archive:
         assert f"runs/{done.directory.name}/accuracy.json" in archive.namelist()
     call("check", "files", str(done.directory), check=True)
 
 
-def test_an_interrupted_accuracy_continues_and_an_edited_one_can_be_measured_again(tmp_path: Path) -> None:
+def test_an_interrupted_accuracy_continues_and_an_edited_one_can_be_measured_again(
+    tmp_path: Path,
+) -> None:
     done = walkers.run(make_case(run=QUICK), tmp_path)
 
     def stop(_: object) -> None:
@@ -308,9 +366,14 @@ def test_an_interrupted_accuracy_continues_and_an_edited_one_can_be_measured_aga
     (done.directory / "accuracy.json").write_text('{"errors": {}}')
     told = call("run", str(done.directory))
     assert (told.returncode, told.stderr.count("\n")) == (2, 1)
-    assert told.stderr.endswith(f"damaged; measure it again with: walkers run {done.directory} --accuracy\n")
+    assert told.stderr.endswith(
+        f"damaged; measure it again with: walkers run {done.directory} --accuracy\n"
+    )
     again = call("run", str(done.directory), "--accuracy", "--json", check=True)
-    assert json.loads(again.stdout.splitlines()[-1])["velocity_error"] == kept["errors"]["velocity"]["total"]
+    assert (
+        json.loads(again.stdout.splitlines()[-1])["velocity_error"]
+        == kept["errors"]["velocity"]["total"]
+    )
 
 
 def test_walkers_up_and_down_a_slope_both_converge(tmp_path: Path) -> None:
@@ -319,10 +382,18 @@ def test_walkers_up_and_down_a_slope_both_converge(tmp_path: Path) -> None:
     found = done.accuracy()
     speeds = [
         [run[f"{way}_facing"] for way in ("right", "left")]
-        for run in (walkers.run(changed(case, times**-0.5, times), tmp_path).result for times in (4.0, 16.0, 64.0))
+        for run in (
+            walkers.run(changed(case, times**-0.5, times), tmp_path).result
+            for times in (4.0, 16.0, 64.0)
+        )
     ]
-    changes = [max(abs(after / before - 1.0) for before, after in zip(*pair, strict=True)) for pair in pairwise(speeds)]
-    times, change = next((16.0 * 4.0**place, one) for place, one in enumerate(changes) if one < 0.01)
+    changes = [
+        max(abs(after / before - 1.0) for before, after in zip(*pair, strict=True))
+        for pair in pairwise(speeds)
+    ]
+    times, change = next(
+        (16.0 * 4.0**place, one) for place, one in enumerate(changes) if one < 0.01
+    )
     assert found["times"] == times
     assert found["change"] == pytest.approx(change, rel=0.02)
 
@@ -334,7 +405,9 @@ def test_walkers_up_and_down_a_slope_both_converge(tmp_path: Path) -> None:
         *((6250.0, [1.0, 4.0, 16.0]), (51200.0, [1.0, 1.953125]), (90000.0, [1.0])),
     ],
 )
-def test_beads_are_compared_with_the_hardest_possible(modulus: float, times: list[float], tmp_path: Path) -> None:
+def test_beads_are_compared_with_the_hardest_possible(
+    modulus: float, times: list[float], tmp_path: Path
+) -> None:
     """Those of 90 GPa cannot be harder: their error is that of the time step alone, and the result says so."""
     case = build_case(
         {
@@ -354,7 +427,10 @@ def test_beads_are_compared_with_the_hardest_possible(modulus: float, times: lis
     done = walkers.run(case, tmp_path)
     own, found = done.result["velocity"], done.accuracy()
     error = found["errors"]["velocity"]
-    half, harder = (walkers.run(changed(case, *how), tmp_path) for how in ((0.5, 1.0), (times[-1] ** -0.5, times[-1])))
+    half, harder = (
+        walkers.run(changed(case, *how), tmp_path)
+        for how in ((0.5, 1.0), (times[-1] ** -0.5, times[-1]))
+    )
     assert half.cached and harder.cached
     assert (own + error["half_step"], own + error["stiffer"]) == pytest.approx(
         (half.result["velocity"], harder.result["velocity"]), rel=1e-12

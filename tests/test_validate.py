@@ -32,11 +32,15 @@ from walkers.second_engine.lines import Line, Verdict, as_dict, as_text, failure
 def test_the_published_points_are_those_of_the_tests() -> None:
     """Points read off lie on curves that are known without an engine: Hertz's peak, spheres that slide."""
     points = {key: panel["series"][0]["points"] for key, panel in published().items()}
-    assert points["glass"][:, 1].max() * 1e3 == pytest.approx(TESTS["1: glass"].impact.peak_force(20.0), rel=5e-3)
+    assert points["glass"][:, 1].max() * 1e3 == pytest.approx(
+        TESTS["1: glass"].impact.peak_force(20.0), rel=5e-3
+    )
     slides = points["spin"][points["spin"][:, 0] < 1.0]
     assert slides[:, 1] == pytest.approx(slides[:, 0] - 1.0, abs=0.02)
     steep = points["oxide-restitution"][points["oxide-restitution"][:, 0] >= 40.0]
-    assert steep[:, 1] == pytest.approx(1.0 - 0.092 * 1.98 / np.tan(np.radians(steep[:, 0])), abs=5e-3)
+    assert steep[:, 1] == pytest.approx(
+        1.0 - 0.092 * 1.98 / np.tan(np.radians(steep[:, 0])), abs=5e-3
+    )
 
 
 @pytest.mark.parametrize("law", ["Rabinovich 2005", "Lambert 2008"])
@@ -51,9 +55,16 @@ def test_laws_have_derjaguins_limit(law: str, radius_2: float) -> None:
 def test_published_laws_beside_young_laplace() -> None:
     """The fit of Willett et al. is within its published error; the law of Soulié et al. is too strong at walls."""
     lines = {line.quantity: line for line in pulls()}
-    assert Counter(line.verdict for line in lines.values()) == {Verdict.PASS: 4, Verdict.NOT_JUDGED: 44}
-    assert lines["Soulié 2006, fig1b, wall: work over Young–Laplace"].measured == pytest.approx(1.39, abs=0.01)
-    assert lines["Soulié 2006, fig1b, beads: work over Young–Laplace"].measured == pytest.approx(0.99, abs=0.01)
+    assert Counter(line.verdict for line in lines.values()) == {
+        Verdict.PASS: 4,
+        Verdict.NOT_JUDGED: 44,
+    }
+    assert lines["Soulié 2006, fig1b, wall: work over Young–Laplace"].measured == pytest.approx(
+        1.39, abs=0.01
+    )
+    assert lines["Soulié 2006, fig1b, beads: work over Young–Laplace"].measured == pytest.approx(
+        0.99, abs=0.01
+    )
 
 
 def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
@@ -69,14 +80,20 @@ def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
     *passed, failed = contents["lines"]
     assert {line["verdict"] for line in passed} == {"pass"}
     assert len(passed) > 55
-    assert (failed["check"], failed["verdict"], "no engine here" in failed["quantity"]) == ("crosscheck", "ERROR", True)
+    assert (failed["check"], failed["verdict"], "no engine here" in failed["quantity"]) == (
+        "crosscheck",
+        "ERROR",
+        True,
+    )
 
 
 def test_experiments_of_others_pass_where_they_are_judged(in_folder: Path) -> None:
     """A bead that is thrown, one on a wet incline; and the drift of a dry bead at one phase."""
     with experiments.workbench() as bench:
         lines = [*experiments.thrown(bench), *experiments.incline(bench)]
-        assert experiments.slider(bench, 60.0) == pytest.approx(experiments.modelled(60.0), abs=5e-3)
+        assert experiments.slider(bench, 60.0) == pytest.approx(
+            experiments.modelled(60.0), abs=5e-3
+        )
     assert {line.verdict for line in lines} == {Verdict.PASS}
     assert len(lines) == 7
 
@@ -98,7 +115,9 @@ def test_a_symmetric_dimer_drifts_by_tones_2_to_3_only(in_folder: Path) -> None:
     assert [line.verdict for line in judged] == [Verdict.PASS, Verdict.PASS]
 
 
-def test_experiments_fail_with_twice_the_friction(in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_experiments_fail_with_twice_the_friction(
+    in_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The speed of rolling does not depend on it."""
     monkeypatch.setitem(experiments._DRY, "contact.friction.bead_wall", 2.0 * experiments.FRICTION)
     with experiments.workbench() as bench:
@@ -121,7 +140,11 @@ def test_one_failed_line_fails_all_checks() -> None:
     ):
         assert line.verdict is verdict
     lines = (GOOD, replace(GOOD, check="second"), BAD)
-    assert (as_dict(lines)["passed"], as_dict(lines[:1])["passed"], failures(lines)) == (False, True, [BAD])
+    assert (as_dict(lines)["passed"], as_dict(lines[:1])["passed"], failures(lines)) == (
+        False,
+        True,
+        [BAD],
+    )
     assert as_text(lines[1:], "engine: ").splitlines()[-1] == "engine: 1 of 2 lines fail"
     assert as_text(lines[:1]).endswith("\nall 1 lines pass")
 
@@ -134,11 +157,15 @@ def _pile(cycles: list[float]) -> Motion:
     time = np.array(cycles) / case.excitation.frequency
     radius = np.array([0.6e-3, 0.3e-3, 0.6e-3])
     parts = [(Path("s"), 0)] * frames
-    return Motion(case, time, position, still, still, still[:, 0], radius, (), parts, truncated=False)
+    return Motion(
+        case, time, position, still, still, still[:, 0], radius, (), parts, truncated=False
+    )
 
 
 @pytest.mark.parametrize(("away", "cycle"), [(2, 0.5), (3, 1.5), (4, 1.5)])
-def test_a_pile_fails_if_a_bead_leaves_its_motion_in_the_first_cycle(away: int, cycle: float) -> None:
+def test_a_pile_fails_if_a_bead_leaves_its_motion_in_the_first_cycle(
+    away: int, cycle: float
+) -> None:
     """By 1.1 % of the smallest radius, one bead of three."""
     first = _pile([0.0, 0.25, 0.5, 1.5])
     moved = first.position.copy()
@@ -178,34 +205,77 @@ NUMBERS = [
     ("wall-is-a-sphere", (), [(1.0, 0.435), (1.0, 0.25)]),
     ("mesh-formats", ("-var", "mesh", "floor-binary.stl"), [(1.0, 1.0)]),
     ("mesh-triangles", (), [(1.0, 1.0)]),
-    ("liquid-content", (), [(88.85e-6, 412.4e-6), (88.85e-6, 88.85e-6), (1.0, 100.0 ** (1.0 / 3.0))]),
+    (
+        "liquid-content",
+        (),
+        [(88.85e-6, 412.4e-6), (88.85e-6, 88.85e-6), (1.0, 100.0 ** (1.0 / 3.0))],
+    ),
 ]
 
 
 # Deck, options, exit status, a part of its message, and whether the message reaches a pipe.
 ENDS = [
     ("abort-loses-its-message", (), 1, "Cannot open gzipped file", False),
-    ("mesh-formats", (), 1, "Expecting ASCII VTK mesh file, cannot continue (./src/input_mesh_tri.cpp:209)", True),
+    (
+        "mesh-formats",
+        (),
+        1,
+        "Expecting ASCII VTK mesh file, cannot continue (./src/input_mesh_tri.cpp:209)",
+        True,
+    ),
     ("mesh-formats", ("-var", "mesh", "floor-solid.stl"), 1, "root causes: (a) mesh empty", True),
-    ("mesh-triangles", ("-var", "mesh", "duplicate.stl"), 1, "(lines 9 and 2) are duplicate", False),
-    ("mesh-triangles", ("-var", "mesh", "sliver.stl"), 1, "(line 9) is lower than the specified curvature", False),
-    ("mesh-triangles", (), 0, "WARNING: Mesh floor: proc 0 has 1 element pairs that are coplanar", True),
+    (
+        "mesh-triangles",
+        ("-var", "mesh", "duplicate.stl"),
+        1,
+        "(lines 9 and 2) are duplicate",
+        False,
+    ),
+    (
+        "mesh-triangles",
+        ("-var", "mesh", "sliver.stl"),
+        1,
+        "(line 9) is lower than the specified curvature",
+        False,
+    ),
+    (
+        "mesh-triangles",
+        (),
+        0,
+        "WARNING: Mesh floor: proc 0 has 1 element pairs that are coplanar",
+        True,
+    ),
 ]
 
 
-def _run_report(folder: Path, name: str, options: Sequence[str], *, buffered: bool) -> subprocess.CompletedProcess[str]:
+def _run_report(
+    folder: Path, name: str, options: Sequence[str], *, buffered: bool
+) -> subprocess.CompletedProcess[str]:
     """Run a deck by the engine as it is packaged: without a contact model of ours."""
     for kind in ("lig", "stl", "vtk"):
         for file in REPORTS.glob(f"*.{kind}"):
             shutil.copy(file, folder)
-    environment = {name: value for name, value in os.environ.items() if name != "LD_PRELOAD"} | ALONE
-    command = [*(() if buffered else ("stdbuf", "-oL")), "liggghts", "-log", "none", *options, "-in", f"{name}.lig"]
+    environment = {
+        name: value for name, value in os.environ.items() if name != "LD_PRELOAD"
+    } | ALONE
+    command = [
+        *(() if buffered else ("stdbuf", "-oL")),
+        "liggghts",
+        "-log",
+        "none",
+        *options,
+        "-in",
+        f"{name}.lig",
+    ]
     how = {"env": environment, "capture_output": True, "text": True, "errors": "replace"}
     return subprocess.run(command, cwd=folder, check=False, **how)
 
 
 def test_reports_name_their_decks() -> None:
-    assert all(f"({deck.stem}.lig)" in (REPORTS / "index.md").read_text("utf-8") for deck in REPORTS.glob("*.lig"))
+    assert all(
+        f"({deck.stem}.lig)" in (REPORTS / "index.md").read_text("utf-8")
+        for deck in REPORTS.glob("*.lig")
+    )
 
 
 @pytest.mark.parametrize(("name", "options", "numbers"), NUMBERS)
@@ -214,7 +284,9 @@ def test_deck_gives_the_number_of_its_report(
 ) -> None:
     done = _run_report(tmp_path, name, options, buffered=False)
     assert done.returncode == 0, done.stdout[-500:]
-    measured = [float(number) for line in _RESULT.findall(done.stdout) for number in _NUMBER.findall(line)]
+    measured = [
+        float(number) for line in _RESULT.findall(done.stdout) for number in _NUMBER.findall(line)
+    ]
     for value, (expected, stated) in zip(measured, numbers, strict=True):
         assert value == pytest.approx(stated, rel=3e-3, abs=1e-7)
         assert expected == stated or abs(value - expected) > 0.1 * abs(expected)

@@ -28,12 +28,26 @@ from walkers.inputs.tables.boundary import Boundary
 from walkers.postprocess.measure.motion import Group, Motion, read_bridges, read_motion
 from walkers.postprocess.measure.results import read
 from walkers.postprocess.measure.tables import read_table
-from walkers.postprocess.show.figures import MOST_NAMED, _interpolated, figures_of, looks_of, plot_run
+from walkers.postprocess.show.figures import (
+    MOST_NAMED,
+    _interpolated,
+    figures_of,
+    looks_of,
+    plot_run,
+)
 from walkers.postprocess.show.film_options import FilmOptions
 from walkers.postprocess.show.films import film_times
 from walkers.postprocess.show.necks import NO_BRIDGES, bridges_at, ends_of, necks_of
 from walkers.postprocess.show.paraview import _walls, write_vtk
-from walkers.postprocess.show.scene import Scene, Window, axes_toward, camera_axes, gathered, mesh_of, walls_of
+from walkers.postprocess.show.scene import (
+    Scene,
+    Window,
+    axes_toward,
+    camera_axes,
+    gathered,
+    mesh_of,
+    walls_of,
+)
 from walkers.postprocess.show.series import _figure
 
 
@@ -41,7 +55,12 @@ from walkers.postprocess.show.series import _figure
 def directory(run_directory: Callable[..., Path]) -> Path:
     return run_directory(
         dimers={"replicates": 2, "angle_spread": "1 deg"},
-        run={"cycles": 8, "settling_cycles": 2, "samples_per_cycle": 20, "bridge_samples_per_cycle": 2},
+        run={
+            "cycles": 8,
+            "settling_cycles": 2,
+            "samples_per_cycle": 20,
+            "bridge_samples_per_cycle": 2,
+        },
     )
 
 
@@ -61,11 +80,21 @@ def test_beads_and_floor_are_where_the_engine_put_them(moved: Group, collection:
         seconds = [float(entry.attrib["timestep"]) for entry in sets if entry.get("name") == kind]
         np.testing.assert_allclose(seconds, moved.time[::every], atol=1e-15)
     frame = 13
-    beads, shift = pv.read(collection.parent / f"beads_{frame:06d}.vtu"), moved.motion.substrate[frame]
-    np.testing.assert_allclose(beads.points, (moved.position[frame] + shift).reshape(-1, 3), rtol=1e-12)
+    beads, shift = (
+        pv.read(collection.parent / f"beads_{frame:06d}.vtu"),
+        moved.motion.substrate[frame],
+    )
+    np.testing.assert_allclose(
+        beads.points, (moved.position[frame] + shift).reshape(-1, 3), rtol=1e-12
+    )
     velocity = moved.velocity[frame].reshape(-1, 3)
     arrays = {
-        **{"bead": range(4), "walker": [0, 0, 1, 1], "large": [1, 0] * 2, "radius (m)": [3e-4, 2e-4] * 2},
+        **{
+            "bead": range(4),
+            "walker": [0, 0, 1, 1],
+            "large": [1, 0] * 2,
+            "radius (m)": [3e-4, 2e-4] * 2,
+        },
         **{"velocity (m/s)": velocity, "speed (m/s)": np.linalg.norm(velocity, axis=1)},
         "omega (rad/s)": moved.spin[frame].reshape(-1, 3),
     }
@@ -73,13 +102,20 @@ def test_beads_and_floor_are_where_the_engine_put_them(moved: Group, collection:
     for name, values in arrays.items():
         np.testing.assert_allclose(beads.point_data[name], values)
     floors = [pv.read(collection.parent / f"boundary_{number:06d}.vtu") for number in (0, frame)]
-    np.testing.assert_allclose(floors[1].points - floors[0].points, np.tile(shift, (4, 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        floors[1].points - floors[0].points, np.tile(shift, (4, 1)), atol=1e-12
+    )
     assert np.linalg.norm(shift) > 1e-5
     assert floors[0].bounds[4:] == pytest.approx([0.0, 0.0], abs=1e-15)
 
 
-def test_bridges_are_lines_with_force_and_gap(directory: Path, moved: Group, collection: Path) -> None:
-    bridges, table = meshio.read(collection.parent / "bridges_000010.vtu"), read_table(directory, "bridges")
+def test_bridges_are_lines_with_force_and_gap(
+    directory: Path, moved: Group, collection: Path
+) -> None:
+    bridges, table = (
+        meshio.read(collection.parent / "bridges_000010.vtu"),
+        read_table(directory, "bridges"),
+    )
     rows = table[np.isclose(table["time"], moved.time[10])]
     # Rows are sorted by walkers and contacts, lines are not.
     cells = {name.partition(" ")[0]: values for name, (values,) in bridges.cell_data.items()}
@@ -118,7 +154,11 @@ _FOREIGN: list[dict[str, str]] = [
     {"turbine_0001.vtu": "x", "turbine.pvd": "x"},
     {"beads_000000.vtu": "x", "show.py": "x"},
     {"walkers.pvd": _LISTS.format("turbine.vtu"), "turbine.vtu": "x"},
-    {"walkers.pvd": _LISTS.format("beads_000000.vtu"), "beads_000000.vtu": "x", "beads_000001.vtu": "x"},
+    {
+        "walkers.pvd": _LISTS.format("beads_000000.vtu"),
+        "beads_000000.vtu": "x",
+        "beads_000001.vtu": "x",
+    },
 ]
 """Files of others: of VTK, named as ours without a collection, in another collection, and not in it."""
 
@@ -137,7 +177,10 @@ def test_an_export_replaces_its_own_files_alone(directory: Path, tmp_path: Path)
         write_vtk(directory, place, every=every)
         assert len(list(place.glob("beads_*.vtu"))) == 160 // every + 1
     (tmp_path / "link").symlink_to(place)
-    for wrong, told in ((place / "walkers.pvd", "it is a file"), (tmp_path / "link", "it is a symbolic link")):
+    for wrong, told in (
+        (place / "walkers.pvd", "it is a file"),
+        (tmp_path / "link", "it is a symbolic link"),
+    ):
         with pytest.raises(InputError, match=told):
             write_vtk(directory, wrong)
 
@@ -147,17 +190,43 @@ def test_a_lammps_dump_holds_the_motion(directory: Path, motion: Motion, tmp_pat
     written = motion.select(slice(None, None, 4))
     frames = [text.split("ITEM: ") for text in path.read_text().split("ITEM: TIMESTEP\n")[1:]]
     steps, counts, _, tables = zip(*frames, strict=True)
-    np.testing.assert_allclose(np.array(steps, int) * motion.case.run.time_step, written.time, atol=1e-12)
+    np.testing.assert_allclose(
+        np.array(steps, int) * motion.case.run.time_step, written.time, atol=1e-12
+    )
     assert {text.split()[-1] for text in counts} == {"4"}
     columns = tables[0].split()[1:14]
-    assert columns == ["id", "type", "mol", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz"]
-    rows = np.array([text.split("\n", 1)[1].split() for text in tables], dtype=float).reshape(len(steps), 4, 13)
-    np.testing.assert_array_equal(rows[0, :, :4], [[1, 1, 1, 0.3], [2, 2, 1, 0.2], [3, 1, 2, 0.3], [4, 2, 2, 0.2]])
-    for first, values in ((4, 1e3 * written.position), (7, 1e3 * written.velocity), (10, written.spin)):
+    assert columns == [
+        "id",
+        "type",
+        "mol",
+        "radius",
+        "x",
+        "y",
+        "z",
+        "vx",
+        "vy",
+        "vz",
+        "omegax",
+        "omegay",
+        "omegaz",
+    ]
+    rows = np.array([text.split("\n", 1)[1].split() for text in tables], dtype=float).reshape(
+        len(steps), 4, 13
+    )
+    np.testing.assert_array_equal(
+        rows[0, :, :4], [[1, 1, 1, 0.3], [2, 2, 1, 0.2], [3, 1, 2, 0.3], [4, 2, 2, 0.2]]
+    )
+    for first, values in (
+        (4, 1e3 * written.position),
+        (7, 1e3 * written.velocity),
+        (10, written.spin),
+    ):
         np.testing.assert_allclose(rows[..., first : first + 3], values, rtol=1e-9, atol=1e-12)
 
 
-def test_figures_of_runs_come_in_other_formats_and_can_be_printed(directory: Path, tmp_path: Path) -> None:
+def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
+    directory: Path, tmp_path: Path
+) -> None:
     paths = plot_run(directory, tmp_path, "pdf,svg")
     names = [f"{name}.{form}" for name in ("walk", "gait") for form in ("pdf", "svg")]
     assert [path.name for path in paths] == names
@@ -167,9 +236,15 @@ def test_figures_of_runs_come_in_other_formats_and_can_be_printed(directory: Pat
     assert b"/Type3" not in pdf
     assert not list(tmp_path.glob("*.new"))
     figures = figures_of(read(directory))
-    assert [spoilt(figure) + letters(figure) for figure in figures.values()] == [["a", "b", "c"], []]
+    assert [spoilt(figure) + letters(figure) for figure in figures.values()] == [
+        ["a", "b", "c"],
+        [],
+    ]
     looks = looks_of([str(number) for number in range(MOST_NAMED + 3)])
-    assert len({(look["linestyle"], look["marker"], look["color"]) for look in looks[:MOST_NAMED]}) == MOST_NAMED
+    assert (
+        len({(look["linestyle"], look["marker"], look["color"]) for look in looks[:MOST_NAMED]})
+        == MOST_NAMED
+    )
     assert [look.get("label") for look in looks[MOST_NAMED:]] == ["and 3 more", None, None]
 
 
@@ -225,7 +300,9 @@ def _ruby(picture: np.ndarray, share: float = 1.3, least: int = 0) -> np.ndarray
     return (picture[..., 0] > share * picture[..., 1].astype(float)) & (picture[..., 0] > least)
 
 
-def test_rendering_shows_ruby_beads_on_a_grey_floor_and_cuts_nothing(directory: Path, tmp_path: Path) -> None:
+def test_rendering_shows_ruby_beads_on_a_grey_floor_and_cuts_nothing(
+    directory: Path, tmp_path: Path
+) -> None:
     (path,) = walkers.load(directory).render(tmp_path / "walker.png", images=2)
     pixels = np.asarray(Image.open(path).convert("RGB")).astype(int)
     assert 0.02 < np.mean(_ruby(pixels, 1.8, 60)) < 0.5
@@ -234,9 +311,12 @@ def test_rendering_shows_ruby_beads_on_a_grey_floor_and_cuts_nothing(directory: 
 
 
 @pytest.mark.parametrize(
-    ("tilt", "labels"), [(0.0, ["x (mm)", "y (mm)"]), (0.1, ["across the slope (mm)", "uphill (mm)"])]
+    ("tilt", "labels"),
+    [(0.0, ["x (mm)", "y (mm)"]), (0.1, ["across the slope (mm)", "uphill (mm)"])],
 )
-def test_axes_of_a_picture_say_which_way_is_uphill(tilt: float, labels: list[str], motion: Motion) -> None:
+def test_axes_of_a_picture_say_which_way_is_uphill(
+    tilt: float, labels: list[str], motion: Motion
+) -> None:
     on_slope = replace(motion, case=motion.case.put("boundary.tilt", tilt))
     (axes,) = _figure(on_slope, [0], follow=False).axes
     assert [axes.get_xlabel(), axes.get_ylabel()] == labels
@@ -245,40 +325,63 @@ def test_axes_of_a_picture_say_which_way_is_uphill(tilt: float, labels: list[str
 def test_a_neck_is_where_a_bridge_is_and_gone_when_it_ruptured(pile_run: Path) -> None:
     """Of two beads of a pile, whose numbers there are others; a picture between two frames shows the nearest ones."""
     pile = read_motion(pile_run).driven
-    held = [{tuple(pair) for pair in np.sort(bridges.beads).tolist()} for bridges in read_bridges(pile)]
-    frame, pair = next((frame, min(gone)) for frame in range(len(held)) if (gone := held[frame] - held[frame + 1]))
+    held = [
+        {tuple(pair) for pair in np.sort(bridges.beads).tolist()} for bridges in read_bridges(pile)
+    ]
+    frame, pair = next(
+        (frame, min(gone)) for frame in range(len(held)) if (gone := held[frame] - held[frame + 1])
+    )
     pile = pile.select(beads=np.array(pair))
     before, nearest, after = bridges_at(pile, [frame, frame + 0.4, frame + 1])
     assert [0, 1, -1] in before.tolist() and [0, 1, -1] not in after.tolist()
     np.testing.assert_array_equal(before, nearest)
-    axes = axes_toward(np.cross(np.diff(pile.position[frame], axis=0)[0], [0.0, 0.0, 1.0]), np.array([0.0, 0.0, 1.0]))
+    axes = axes_toward(
+        np.cross(np.diff(pile.position[frame], axis=0)[0], [0.0, 0.0, 1.0]),
+        np.array([0.0, 0.0, 1.0]),
+    )
     seen = 1e3 * pile.position[frame : frame + 2] @ axes.T
-    scene = Scene(pile, axes, seen.min(axis=(0, 1)) - 0.3, seen.max(axis=(0, 1)) + 0.3, shaken=False)
+    scene = Scene(
+        pile, axes, seen.min(axis=(0, 1)) - 0.3, seen.max(axis=(0, 1)) + 0.3, shaken=False
+    )
     with closing(Window(scene, (300, 300))) as window:
         shown = ((frame + 1, after), (frame, after), (frame, before), (frame, NO_BRIDGES))
         pictures = [window.picture(*one) for one in shown]
-    *without, wet, dry = [np.count_nonzero(each[..., 2] > 1.5 * each[..., 0].astype(float)) for each in pictures]
+    *without, wet, dry = [
+        np.count_nonzero(each[..., 2] > 1.5 * each[..., 0].astype(float)) for each in pictures
+    ]
     assert wet > 20 + max(*without, dry)
 
 
-@pytest.mark.parametrize(("gap", "meniscus"), [(0.0, None), (5e-6, None), (2e-5, None), (5e-6, 2e-5)])
-def test_a_neck_has_the_volume_of_its_bridge(gap: float, meniscus: float | None, motion: Motion) -> None:
+@pytest.mark.parametrize(
+    ("gap", "meniscus"), [(0.0, None), (5e-6, None), (2e-5, None), (5e-6, 2e-5)]
+)
+def test_a_neck_has_the_volume_of_its_bridge(
+    gap: float, meniscus: float | None, motion: Motion
+) -> None:
     """Within what spheres differ from parabolas; a neck at a plane too, and one whose meniscus gives the volume."""
     if meniscus:
         liquid = motion.case.liquid.but(volume_fraction=None, meniscus_radius=meniscus)
         motion = replace(motion, case=motion.case.but(liquid=liquid))
     for contact in ([0, 1, -1], [0, -1, 0]):
         radius, other = motion.radius[0], motion.radius[1] if contact[1] > 0 else 0.0
-        place = np.array([[0.0, 0.0, radius + gap], [radius + gap + motion.radius[1], 0.0, radius + gap]])
+        place = np.array(
+            [[0.0, 0.0, radius + gap], [radius + gap + motion.radius[1], 0.0, radius + gap]]
+        )
         begins, ends = ends_of(motion, place, np.array([contact]))
         points, _ = necks_of(motion, np.array([contact]), (begins, ends), 65, 64)
         length = np.linalg.norm(ends - begins)
         assert length == pytest.approx(radius + gap + other)
         height = (1e-3 * points[0] - begins[0]) @ (ends - begins)[0] / length
-        width = np.linalg.norm(1e-3 * points[0] - begins - np.outer(height, (ends - begins)[0] / length), axis=1)
+        width = np.linalg.norm(
+            1e-3 * points[0] - begins - np.outer(height, (ends - begins)[0] / length), axis=1
+        )
         step, wide = height.reshape(65, 64)[:, 0], width.reshape(65, 64)[:, 0]
-        assert step[0] == pytest.approx(np.sqrt(radius**2 - wide[0] ** 2))  # on the surface of the bead
-        inside = np.maximum(radius**2 - step**2, 0.0) + np.maximum(other**2 - (length - step) ** 2, 0.0)
+        assert step[0] == pytest.approx(
+            np.sqrt(radius**2 - wide[0] ** 2)
+        )  # on the surface of the bead
+        inside = np.maximum(radius**2 - step**2, 0.0) + np.maximum(
+            other**2 - (length - step) ** 2, 0.0
+        )
         volume = np.pi * np.trapezoid(wide**2 - inside, step)
         assert volume == pytest.approx(
             bridge_at_rest(motion.case, radius, other or np.inf).surfaces.volume, rel=0.3, abs=0.0
@@ -288,7 +391,9 @@ def test_a_neck_has_the_volume_of_its_bridge(gap: float, meniscus: float | None,
 def test_pictures_are_as_far_apart_as_the_slow_motion_says(motion: Motion) -> None:
     times = film_times(motion, FilmOptions(slowdown=20.0))
     np.testing.assert_allclose(np.diff(times.time), 1.0 / 500.0, atol=1e-12)
-    np.testing.assert_allclose(times.frame * np.median(np.diff(motion.time)), times.time, atol=1e-12)
+    np.testing.assert_allclose(
+        times.frame * np.median(np.diff(motion.time)), times.time, atol=1e-12
+    )
     assert film_times(motion, FilmOptions()).slowdown == 100.0  # 0.1 s in ten seconds
     for slowdown in (1.0, 5.0):  # of a cycle of 12.5 ms, pictures 40 and 8 ms apart
         strobed = film_times(motion, FilmOptions(slowdown=slowdown))
@@ -303,40 +408,64 @@ def test_a_scale_bar_is_as_long_as_beads_say(single: Motion) -> None:
     """The red of one bead, seen without perspective, is as wide and as high as its diameter in pixels."""
     bead = single.select(slice(1), beads=np.array([0]))
     bead = replace(bead, walkers=(replace(single.walkers[0], beads=(0,)),))
-    with closing(Window(Scene.around(bead, camera_axes(bead), 1.2, shaken=False), (400, 300))) as window:
+    with closing(
+        Window(Scene.around(bead, camera_axes(bead), 1.2, shaken=False), (400, 300))
+    ) as window:
         picture = window.picture(0).astype(int)
     for places in np.nonzero(_ruby(picture)):
-        assert np.ptp(places) + 1 == pytest.approx(2e3 * bead.radius[0] * window.pixels_per_mm, abs=2.5)
+        assert np.ptp(places) + 1 == pytest.approx(
+            2e3 * bead.radius[0] * window.pixels_per_mm, abs=2.5
+        )
 
 
 @pytest.mark.parametrize(("meet", "seen"), [(True, [-2.0, -2.0]), (False, [-2.0, 0.0])])
 def test_a_closed_tray_is_seen_from_above(meet: bool, seen: list[float], single: Motion) -> None:
     boundary = single.case.boundary.but(shape="box", width=4e-3, height=3e-3)
     case = single.case.but(boundary=boundary).put("dimers.meet", meet)
-    tray = replace(single, position=single.position - np.array([*single.walkers[0].origin, 0.0]), case=case)
+    tray = replace(
+        single, position=single.position - np.array([*single.walkers[0].origin, 0.0]), case=case
+    )
     axes = camera_axes(tray)
     assert axes[2, 2] == float(meet)
     np.testing.assert_allclose(Scene.around(tray, axes, shaken=False).low[:2], seen, atol=1e-2)
 
 
 @pytest.mark.parametrize(("lengths", "follows"), [(0.5, False), (40.0, True)])
-def test_the_camera_follows_a_walker_that_walks_far(lengths: float, follows: bool, single: Motion) -> None:
+def test_the_camera_follows_a_walker_that_walks_far(
+    lengths: float, follows: bool, single: Motion
+) -> None:
     """Its beads are as large in the picture as without the way, and in the middle of it."""
     way = lengths * single.case.walkers[0].length * single.time / single.time[-1]
-    far = replace(single, position=single.position + way[:, None, None] * np.array(single.case.drive_axis))
+    far = replace(
+        single, position=single.position + way[:, None, None] * np.array(single.case.drive_axis)
+    )
     scene = Scene.around(far, camera_axes(far), 1.2, shaken=False).following(1.5, 1.2)
     assert (scene.path is not None) == follows
     if follows:
-        assert np.linalg.norm(scene.moved(len(far.time) - 1)) == pytest.approx(1e3 * way[-1], rel=0.05)
+        assert np.linalg.norm(scene.moved(len(far.time) - 1)) == pytest.approx(
+            1e3 * way[-1], rel=0.05
+        )
     with closing(Window(scene, (300, 200))) as window:
         pictures = [_ruby(window.picture(frame)) for frame in (0, len(far.time) - 1)]
     assert all(ruby.mean() > 0.07 and not ruby[:, [0, -1]].any() for ruby in pictures)
 
 
-def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(directory: Path, tmp_path: Path) -> None:
+def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(
+    directory: Path, tmp_path: Path
+) -> None:
     path = tmp_path / "here" / "walk.mp4"
     done = call(
-        "render", "--film", str(directory), "--to", str(path), "--size", "360p", "--fps", "10", "--slowdown", "10"
+        "render",
+        "--film",
+        str(directory),
+        "--to",
+        str(path),
+        "--size",
+        "360p",
+        "--fps",
+        "10",
+        "--slowdown",
+        "10",
     )
     assert (done.returncode, done.stdout.strip()) == (0, str(path))
     about, *frames = imageio_ffmpeg.read_frames(str(path))
@@ -344,10 +473,28 @@ def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(dir
     ruby = [_ruby(np.frombuffer(each, np.uint8).reshape(360, 640, 3), 2.0, 60) for each in frames]
     assert all(0.02 < one.mean() < 0.4 for one in ruby)
     assert (ruby[0] != ruby[-1]).mean() > 0.01
-    options = ["--size", "160x90", "--fps", "20", "--slowdown", "1e1", "--end", "50 ms", "--walker", "1"]
-    call("render", "--film", str(directory), "--to", str(tmp_path / "walk.gif"), *options, check=True)
+    options = [
+        "--size",
+        "160x90",
+        "--fps",
+        "20",
+        "--slowdown",
+        "1e1",
+        "--end",
+        "50 ms",
+        "--walker",
+        "1",
+    ]
+    call(
+        "render", "--film", str(directory), "--to", str(tmp_path / "walk.gif"), *options, check=True
+    )
     film = Image.open(tmp_path / "walk.gif")
-    assert (film.size, film.n_frames, film.info["duration"], film.info["loop"]) == ((160, 90), 11, 50, 0)
+    assert (film.size, film.n_frames, film.info["duration"], film.info["loop"]) == (
+        (160, 90),
+        11,
+        50,
+        0,
+    )
 
 
 @pytest.mark.parametrize(
@@ -359,7 +506,9 @@ def test_an_mp4_shows_a_walker_that_walks_and_a_gif_lasts_as_long_as_it_says(dir
         (Boundary(shape="cylinder", material="glass", width=2e-3, height=4e-3), 65, 64),
     ],
 )
-def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Boundary, faces: int, edges: int) -> None:
+def test_walls_are_whole_wherever_the_beads_are(
+    motion: Motion, boundary: Boundary, faces: int, edges: int
+) -> None:
     """Beads high above the floor of a container, or far from the middle of what has no end; seams are at the ends."""
     away = [0.0, 0.0, 2e-3] if boundary.closed else [5e-2, 0.0, 0.0]
     beads = 0.1 * (motion.position - motion.position.mean(axis=(0, 1))) + away
@@ -369,20 +518,28 @@ def test_walls_are_whole_wherever_the_beads_are(motion: Motion, boundary: Bounda
     assert walls.n_open_edges == edges
     triangles = _walls(placed)
     first, second, third = triangles.points[triangles.cells_dict["triangle"]].swapaxes(0, 1)
-    assert np.linalg.norm(np.cross(second - first, third - first), axis=1).sum() / 2.0 == pytest.approx(walls.area)
+    assert np.linalg.norm(
+        np.cross(second - first, third - first), axis=1
+    ).sum() / 2.0 == pytest.approx(walls.area)
 
 
 @pytest.mark.slow
 def test_pvpython_shows_spheres_bridges_and_floor(directory: Path, tmp_path: Path) -> None:
     """With ParaView and Xvfb, 1.4 GB, which ``make test-slow`` installs."""
     collection = walkers.load(directory).export("vtk", tmp_path / "vtk")
-    script = collection.parent.rename(tmp_path / "moved") / "show.py"  # the files are found beside it
+    script = (
+        collection.parent.rename(tmp_path / "moved") / "show.py"
+    )  # the files are found beside it
     picture = tmp_path / "walkers.png"
     command = ["xvfb-run", "-a", "pvpython", str(script), str(picture), "0.05"]
     for _ in range(3):  # under load it may not wait long enough for its screen
         picture.exists() or subprocess.run(command, timeout=300, check=False, cwd=tmp_path)
     pixels = np.asarray(Image.open(picture).convert("RGB")).astype(int)
     for first, last in ((0, 2), (2, 0)):  # each walker
-        assert 0.005 < ((pixels[..., first] > 1.5 * pixels[..., last]) & (pixels[..., first] > 60)).mean() < 0.5
+        assert (
+            0.005
+            < ((pixels[..., first] > 1.5 * pixels[..., last]) & (pixels[..., first] > 60)).mean()
+            < 0.5
+        )
     assert (np.ptp(pixels - [199, 209, 217], axis=-1) < 12).mean() > 0.1  # the floor
     assert (pixels[:60, :200].max(axis=-1) < 80).sum() > 50  # the time

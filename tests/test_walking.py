@@ -37,7 +37,13 @@ from walkers.postprocess.measure.walking import measure, walkers_met
 from walkers.postprocess.show.figures import figures_of
 from walkers.progress import Progress
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import FIRST_SEGMENT, case_of, leave_out_dumps, recomputed, segment_directories
+from walkers.runner.directory import (
+    FIRST_SEGMENT,
+    case_of,
+    leave_out_dumps,
+    recomputed,
+    segment_directories,
+)
 from walkers.runner.manifest import RESULT_NAME, read_manifest
 from walkers.runs.making import make_runs
 from walkers.theory.mathieu import turning_rate
@@ -75,18 +81,24 @@ def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
     np.testing.assert_allclose(motion.velocity[settled].mean(axis=0), walked["velocity"], rtol=0.03)
     # Sliding is velocity less rotation: the mass centre moves as its beads do, weighted by their masses.
     weights = moved.radii**3 / np.sum(moved.radii**3)
-    np.testing.assert_allclose((motion.sliding[..., :2] + motion.rotation) @ weights, motion.velocity, atol=1e-12)
+    np.testing.assert_allclose(
+        (motion.sliding[..., :2] + motion.rotation) @ weights, motion.velocity, atol=1e-12
+    )
     np.testing.assert_allclose(motion.sliding[..., 2], -motion.rotation.sum(axis=-1), atol=1e-15)
 
 
 @pytest.mark.parametrize("drift", [1e-3, -1e-3])
-def test_walkers_of_both_headings_that_drift_to_one_side_have_one_lateral_velocity(moved: Group, drift: float) -> None:
+def test_walkers_of_both_headings_that_drift_to_one_side_have_one_lateral_velocity(
+    moved: Group, drift: float
+) -> None:
     """Along y, to the left of the drive axis; nothing else of their velocities changes."""
     position = moved.position.copy()
     position[..., 1] += drift * moved.time[:, None, None]
     before, after = walk(moved), walk(replace(moved, position=position))
     assert {walker.facing for walker in moved.walkers} == {1, -1}
-    np.testing.assert_allclose(after["lateral_velocity"] - before["lateral_velocity"], drift, rtol=1e-9)
+    np.testing.assert_allclose(
+        after["lateral_velocity"] - before["lateral_velocity"], drift, rtol=1e-9
+    )
     np.testing.assert_allclose(after["axial_velocity"], before["axial_velocity"], rtol=1e-9)
 
 
@@ -95,8 +107,12 @@ def test_a_lateral_velocity_is_to_the_left_of_the_drive(moved: Group) -> None:
     position = moved.position.copy()
     position[..., 0] += 1e-3 * moved.time[:, None, None]
     case = moved.case.put("drive.axis", "y")
-    before, after = (walk(replace(moved, case=case, position=places)) for places in (moved.position, position))
-    np.testing.assert_allclose(after["lateral_velocity"] - before["lateral_velocity"], -1e-3, rtol=1e-9)
+    before, after = (
+        walk(replace(moved, case=case, position=places)) for places in (moved.position, position)
+    )
+    np.testing.assert_allclose(
+        after["lateral_velocity"] - before["lateral_velocity"], -1e-3, rtol=1e-9
+    )
     np.testing.assert_allclose(after["axial_velocity"], before["axial_velocity"], rtol=1e-9)
 
 
@@ -111,12 +127,16 @@ def _turned(moved: Group, angle: np.ndarray[Any, Any], case: Case) -> Group:
     position[..., 0] = centre[..., 0] + cosine * arm[..., 0] - sine * arm[..., 1]
     position[..., 1] = centre[..., 1] + sine * arm[..., 0] + cosine * arm[..., 1]
     turned = replace(moved, case=case, position=position)
-    np.testing.assert_allclose(turned.orientation, np.tile(angle[:, None], len(moved.walkers)), atol=1e-9)
+    np.testing.assert_allclose(
+        turned.orientation, np.tile(angle[:, None], len(moved.walkers)), atol=1e-9
+    )
     return turned
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_walker_on_a_slope_turns_over_when_the_tangent_of_half_its_angle_is_one(moved: Group, sign: float) -> None:
+def test_a_walker_on_a_slope_turns_over_when_the_tangent_of_half_its_angle_is_one(
+    moved: Group, sign: float
+) -> None:
     """dψ/dt = 2/s · sin ψ: tan(ψ/2) = tan(0.5°) exp(2t/s), from 1° to 90°."""
     sloped = moved.case.put("boundary.tilt", 0.1)
     angle = 2.0 * np.arctan(np.tan(np.radians(0.5)) * np.exp(2.0 * moved.time))
@@ -126,7 +146,9 @@ def test_a_walker_on_a_slope_turns_over_when_the_tangent_of_half_its_angle_is_on
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_walker_on_a_level_floor_turns_away_when_the_tangent_of_its_angle_is_one(moved: Group, sign: float) -> None:
+def test_a_walker_on_a_level_floor_turns_away_when_the_tangent_of_its_angle_is_one(
+    moved: Group, sign: float
+) -> None:
     """dψ/dt = 2/s · sin 2ψ / 2: tan ψ = tan(1°) exp(2t/s), from 1° to 45°."""
     angle = np.arctan(np.tan(np.radians(1.0)) * np.exp(2.0 * moved.time))
     left = np.log(1.0 / np.tan(np.radians(1.0))) / 2.0 - moved.time[-1]
@@ -139,7 +161,9 @@ def test_a_walker_on_a_level_floor_turns_away_when_the_tangent_of_its_angle_is_o
     [(-2.0, 1.0), (0.0, 1.0), (0.04, 1.0), (2.0, 0.5)],
     ids=["shrinks", "stays", "grows too slowly", "is too small"],
 )
-def test_a_walker_whose_angle_does_not_grow_turns_away_never(moved: Group, rate: float, degrees: float) -> None:
+def test_a_walker_whose_angle_does_not_grow_turns_away_never(
+    moved: Group, rate: float, degrees: float
+) -> None:
     angle = np.radians(degrees) * np.exp(rate * moved.time)
     assert np.isnan(turns_away_after(_turned(moved, angle, moved.case))).all()
 
@@ -150,23 +174,35 @@ def test_the_orientation_of_a_walker_that_goes_round_does_not_jump(moved: Group)
     position = moved.position.copy()
     position[..., :2] = np.einsum("xyf,wby->fwbx", turn, moved.position[0, ..., :2])
     orientation = replace(moved, position=position).orientation
-    np.testing.assert_allclose(orientation - orientation[0], np.tile(angle[:, None], len(moved.walkers)), atol=1e-9)
+    np.testing.assert_allclose(
+        orientation - orientation[0], np.tile(angle[:, None], len(moved.walkers)), atol=1e-9
+    )
 
 
 def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
     result = read(directory)
     each = result.table("walkers")
     velocity, right = each["velocity"], each["velocity"][each["facing"] == 1]
-    expected = [velocity.mean(), velocity.min(), velocity.max(), velocity.std(), right.mean(), right.std()]
+    expected = [
+        velocity.mean(),
+        velocity.min(),
+        velocity.max(),
+        velocity.std(),
+        right.mean(),
+        right.std(),
+    ]
     names = ("velocity", "smallest", "largest", "scatter", "right_facing", "right_scatter")
     assert [result[name] for name in names] == pytest.approx(expected)
     assert result["axial_left_facing"] < 0 < result["axial_velocity"]
     assert (result["facing_right"], result["steady"], result["walkers_met"]) == (3, 6, False)
-    assert set(map(declared, result)) and all(isinstance(number, (bool, int, float)) for number in result.values())
+    assert set(map(declared, result)) and all(
+        isinstance(number, (bool, int, float)) for number in result.values()
+    )
     assert json.loads(json.dumps(result.as_dict())) == result.as_dict()
     # Velocities of both directions have the scatter of their walkers, in mm/s.
     errors = {
-        row.name: row.error for row in rows({**result, "scatter": 1e-5, "right_scatter": 2e-5, "left_scatter": 3e-5})
+        row.name: row.error
+        for row in rows({**result, "scatter": 1e-5, "right_scatter": 2e-5, "left_scatter": 3e-5})
     }
     said = {
         name: float(errors[name].removeprefix("scatter of copies "))
@@ -180,7 +216,9 @@ def test_a_result_is_measured_again_by_walkers_run_alone(directory: Path, tmp_pa
     copy = Path(shutil.copytree(directory, tmp_path / directory.name))
     before = {path: path.stat().st_mtime_ns for path in copy.rglob("*")}
     right, contents = read(copy).as_dict(), read_json(copy / RESULT_NAME)
-    assert before == {path: path.stat().st_mtime_ns for path in copy.rglob("*")}  # reading writes nothing
+    assert before == {
+        path: path.stat().st_mtime_ns for path in copy.rglob("*")
+    }  # reading writes nothing
     edited = {**contents, "numbers": {**contents["numbers"], "velocity": 99.0}}
     for wrong in ({**contents, "version": 0}, {"version": 1}, edited):
         write_json(copy / RESULT_NAME, wrong)
@@ -207,7 +245,9 @@ def test_a_result_is_measured_again_by_walkers_run_alone(directory: Path, tmp_pa
         ("pile-ci", {}, ["piles"]),
     ],
 )
-def test_modules_measure_the_cases_to_which_they_apply(case: str, changes: dict[str, Any], names: list[str]) -> None:
+def test_modules_measure_the_cases_to_which_they_apply(
+    case: str, changes: dict[str, Any], names: list[str]
+) -> None:
     assert [module.NAME for module in modules_of(load_case(case, changes))] == names
 
 
@@ -235,7 +275,9 @@ def test_a_module_outdates_only_results_that_it_measured(
     assert walkers.run(run).result.as_dict() == right
     assert (run / RESULT_NAME).read_bytes() == written
     monkeypatch.setattr(walking, "VERSION", walking.VERSION + 1)
-    with pytest.raises(InputError, match=f"another version of the program; walkers run {run} measures it again"):
+    with pytest.raises(
+        InputError, match=f"another version of the program; walkers run {run} measures it again"
+    ):
         read(run)
     with pytest.raises(InputError, match="cannot be read"):
         walkers.run(run)
@@ -272,7 +314,9 @@ def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: Ru
     turned = read(run_directory(dimers={"angle": "150 deg"}, run=SHORT))
     assert [turned[name] for name in ("facing_right", "facing_left")] == [0, 1]
     assert np.isnan(turned["scatter"])  # a single walker
-    assert str(figures_of(turned)["walk"].axes[1].lines[0].get_label()).startswith("0: left at -30°, ")
+    assert str(figures_of(turned)["walk"].axes[1].lines[0].get_label()).startswith(
+        "0: left at -30°, "
+    )
 
 
 def test_on_slopes_rows_and_figures_are_by_the_way_up(run_directory: RunDirectory) -> None:
@@ -301,24 +345,45 @@ def test_on_slopes_rows_and_figures_are_by_the_way_up(run_directory: RunDirector
 
 
 _STEEL = {
-    **{"beads.material": "chrome steel", "dimers.radii": ["0.8 mm", "0.5 mm"], "liquid.name": "ethylene glycol"},
-    **{"boundary.material": "PTFE", "drive.peak_acceleration": "2 g", "dimers.angle": "1 deg", "dimers.replicates": 1},
+    **{
+        "beads.material": "chrome steel",
+        "dimers.radii": ["0.8 mm", "0.5 mm"],
+        "liquid.name": "ethylene glycol",
+    },
+    **{
+        "boundary.material": "PTFE",
+        "drive.peak_acceleration": "2 g",
+        "dimers.angle": "1 deg",
+        "dimers.replicates": 1,
+    },
 }
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")
-def test_two_frames_of_a_walker_on_a_slope_say_nothing_of_its_turning_over(runs_folder: Path) -> None:
+def test_two_frames_of_a_walker_on_a_slope_say_nothing_of_its_turning_over(
+    runs_folder: Path,
+) -> None:
     """Three are necessary to see that an angle grows faster and faster."""
-    few = {"run.cycles": 8, "run.settling_cycles": 4, "run.frames_per_second": 20, "dimers.replicates": 1}
+    few = {
+        "run.cycles": 8,
+        "run.settling_cycles": 4,
+        "run.frames_per_second": 20,
+        "dimers.replicates": 1,
+    }
     done = walkers.run(load_case("fig1b", {"boundary.tilt": "4 deg", **few}), runs_folder)
     assert len(done.table("cycles")["time"]) == 3
     assert not done.result.warnings
 
 
-def test_a_run_that_ends_before_its_walker_turns_over_says_how_long_it_must_be(runs_folder: Path) -> None:
+def test_a_run_that_ends_before_its_walker_turns_over_says_how_long_it_must_be(
+    runs_folder: Path,
+) -> None:
     """Of steel on PTFE; ruby stands on a gentle slope."""
     shorts = [
-        walkers.run(load_case("fig1b", {"boundary.tilt": "4 deg", "run.cycles": cycles, **changes}), runs_folder)
+        walkers.run(
+            load_case("fig1b", {"boundary.tilt": "4 deg", "run.cycles": cycles, **changes}),
+            runs_folder,
+        )
         for cycles, changes in ((40, _STEEL), (24, {"dimers.replicates": 1}))
     ]
     assert [run.result["turned_over"] for run in shorts] == [0, 0]
@@ -337,12 +402,23 @@ def test_a_run_that_ends_before_its_walker_turns_over_says_how_long_it_must_be(r
 def test_a_walker_on_a_level_plate_that_turns_away_says_when(runs_folder: Path) -> None:
     """Of steel in glycerol, at the theory's rate, from 10° to 45° as tan ψ grows exponentially; ruby stays."""
     drive = {"drive.peak_acceleration": "5 g", "drive.frequency": "60 Hz", "run.cycles": 12}
-    steel = {**_STEEL, **drive, "liquid.name": "glycerol 87 %", "boundary.material": "glass", "dimers.angle": "10 deg"}
+    steel = {
+        **_STEEL,
+        **drive,
+        "liquid.name": "glycerol 87 %",
+        "boundary.material": "glass",
+        "dimers.angle": "10 deg",
+    }
     case = load_case("fig1b", {**steel, "dimers.angle_spread": "0 deg"})
     done = walkers.run(case, runs_folder)
     (warning,) = done.result.warnings
-    assert warning.startswith("1 of 1 walker turns away from the drive axis faster and faster, by 45° after about ")
-    seconds, cycles = float(warning.partition("about ")[2].split()[0]), int(warning.rpartition("= ")[2])
+    assert warning.startswith(
+        "1 of 1 walker turns away from the drive axis faster and faster, by 45° after about "
+    )
+    seconds, cycles = (
+        float(warning.partition("about ")[2].split()[0]),
+        int(warning.rpartition("= ")[2]),
+    )
     angle = abs(done.result["orientation_end"])
     assert seconds == pytest.approx(-np.log(np.tan(angle)) / turning_rate(case), rel=0.2)
     longer = walkers.run(changed_case(case, {"run.cycles": cycles}), runs_folder)
@@ -350,13 +426,17 @@ def test_a_walker_on_a_level_plate_that_turns_away_says_when(runs_folder: Path) 
     names = [run.directory.name for run in (done, longer)]
     assert f"{names[0]}: warning: {warning}" in compare(*names, runs_folder).text
     # Rolling friction may hold walkers at less than a degree.
-    assert not walkers.run(changed_case(case, {"dimers.angle": "0.5 deg"}), runs_folder).result.warnings
+    assert not walkers.run(
+        changed_case(case, {"dimers.angle": "0.5 deg"}), runs_folder
+    ).result.warnings
     away = table["time"][table["orientation"].abs() > np.pi / 4.0].iloc[0]
     assert away - done.table("cycles")["time"].iloc[-1] == pytest.approx(seconds, rel=0.25)
     assert not walkers.run(load_case("fig1b"), runs_folder).result.warnings
 
 
-def test_symmetric_walkers_that_turn_away_tell_that_small_angles_grow_too(runs_folder: Path) -> None:
+def test_symmetric_walkers_that_turn_away_tell_that_small_angles_grow_too(
+    runs_folder: Path,
+) -> None:
     """All six turn in a longer run: a warning about one of them does not mean that five stay."""
     done = walkers.run("symmetric", runs_folder)
     (warning,) = done.result.warnings
@@ -370,7 +450,12 @@ def test_small_angles_that_decay_are_not_said_to_grow(runs_folder: Path) -> None
 
 def test_progress_says_when_results_are_measured(tmp_path: Path) -> None:
     told: list[Progress] = []
-    make_runs([build_case(document(run=SHORT), name="short")], tmp_path, find_engine(), on_progress=told.append)
+    make_runs(
+        [build_case(document(run=SHORT), name="short")],
+        tmp_path,
+        find_engine(),
+        on_progress=told.append,
+    )
     assert told[-1] == Progress(1.0, "measuring")
 
 
@@ -392,14 +477,24 @@ def test_walkers_that_come_close_are_reported(moved: Group) -> None:
 def test_the_drive_pays_for_what_slides(run_directory: RunDirectory) -> None:
     """Equal beads that keep each other from rolling, hardly held by friction: 4 A μ N in a cycle, to no end."""
     directory = run_directory(
-        dimers={"radii": ["0.25 mm", "0.25 mm"], "replicates": 1, "angle_spread": "0 deg", "gap_spread": 0.0},
+        dimers={
+            "radii": ["0.25 mm", "0.25 mm"],
+            "replicates": 1,
+            "angle_spread": "0 deg",
+            "gap_spread": 0.0,
+        },
         liquid={"viscosity_ratio": 1e-4},
         contact={"friction": {"bead_wall": 0.01, "bead_bead": 1.0}, "rolling_friction": 0.0},
         run={"cycles": 60, "settling_cycles": 50, "samples_per_cycle": 20},
     )
     case, result = case_of(directory), read(directory)
-    pressed = sum(load.pull for load in contact_loads(case)[:2]) + dimer_of(case).total_mass * case.pressing_gravity
-    assert result["work"] == pytest.approx(4.0 * case.excitation.amplitude * 0.01 * pressed, rel=0.02)
+    pressed = (
+        sum(load.pull for load in contact_loads(case)[:2])
+        + dimer_of(case).total_mass * case.pressing_gravity
+    )
+    assert result["work"] == pytest.approx(
+        4.0 * case.excitation.amplitude * 0.01 * pressed, rel=0.02
+    )
     assert isnan(result["cost_of_transport"])
     works = result.table("cycles").set_index("cycle")["work"]
     assert works[50:].mean() == pytest.approx(result["work"])
@@ -409,7 +504,9 @@ def test_the_cost_of_transport_is_that_of_each_kinds_own_mass(run_directory: Run
     """Of a dimer and of a fan whose mass is more than six times as large: the mean of f W / (M g v)."""
     radii = {0: [0.3e-3, 0.2e-3], 1: [0.6e-3, 0.3e-3, 0.3e-3]}
     fan = {"arrangement": "fan", "radii": ["0.6 mm", "0.3 mm", "0.3 mm"], "replicates": 1}
-    tables = document(dimers={"replicates": 1}, run={"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10})
+    tables = document(
+        dimers={"replicates": 1}, run={"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
+    )
     case = build_case({**tables, "clusters": [fan]}, name="two-kinds")
     result = read(run_directory(case))
     cycles = result.table("cycles").set_index("cycle")
@@ -423,7 +520,12 @@ def test_the_cost_of_transport_is_that_of_each_kinds_own_mass(run_directory: Run
 
 
 def test_bridges_are_sampled_as_often_in_a_cycle_as_is_asked(run_directory: RunDirectory) -> None:
-    run = {"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 20, "bridge_samples_per_cycle": 4}
+    run = {
+        "cycles": 4,
+        "settling_cycles": 1,
+        "samples_per_cycle": 20,
+        "bridge_samples_per_cycle": 4,
+    }
     result = read(run_directory(run=run))
     times = np.unique(result.table("bridges")["time"])
     np.testing.assert_allclose(times, np.arange(17) / (4.0 * 80.0), atol=1e-9)
@@ -438,7 +540,13 @@ def _hopping(samples: int, **run: object) -> Case:
     """Fig. 4b's walker, whose beads part in every cycle."""
     tables = read_toml(shipped("case")["fig4b"])
     tables["dimers"]["replicates"] = 1
-    tables["run"] = {"time_step": "3 us", "cycles": 12, "settling_cycles": 4, "samples_per_cycle": samples, **run}
+    tables["run"] = {
+        "time_step": "3 us",
+        "cycles": 12,
+        "settling_cycles": 4,
+        "samples_per_cycle": samples,
+        **run,
+    }
     return build_case(tables, source="test", name=f"hopping-{samples}")
 
 
@@ -451,7 +559,8 @@ def test_means_do_not_depend_on_how_often_is_looked(groups: dict[int, Group]) ->
     np.testing.assert_allclose(few.open, many.open, atol=0.01)
     # What many samples say by themselves is near it, what few say is not.
     sampled = {
-        samples: gait(group).sliding[settled_samples(group.case.run)].mean(axis=0) for samples, group in groups.items()
+        samples: gait(group).sliding[settled_samples(group.case.run)].mean(axis=0)
+        for samples, group in groups.items()
     }
     np.testing.assert_allclose(sampled[200], many.sliding, atol=1e-2 * scale)
     assert np.abs(sampled[20] - many.sliding).max() > 5e-3 * scale
@@ -461,14 +570,21 @@ def test_mean_spins_are_those_of_all_steps_between_two_samples(groups: dict[int,
     """As ten times as many samples give them, which one sample of the twenty does not."""
     few, many = groups[20].motion, groups[200].motion
     assert few.mean_spin is not None
-    between = (many.spin[1:] + many.spin[:-1]).reshape(len(few.time) - 1, 10, *few.spin.shape[1:]).mean(axis=1) / 2.0
+    between = (many.spin[1:] + many.spin[:-1]).reshape(
+        len(few.time) - 1, 10, *few.spin.shape[1:]
+    ).mean(axis=1) / 2.0
     size = float(np.sqrt(np.mean(between**2)))
-    off, sampled = (float(np.sqrt(np.mean((one[1:] - between) ** 2))) / size for one in (few.mean_spin, few.spin))
+    off, sampled = (
+        float(np.sqrt(np.mean((one[1:] - between) ** 2))) / size
+        for one in (few.mean_spin, few.spin)
+    )
     assert off < 0.01
     assert sampled > 0.1
 
 
-def test_a_run_in_parts_has_the_same_means(groups: dict[int, Group], trajectory: Callable[..., Group]) -> None:
+def test_a_run_in_parts_has_the_same_means(
+    groups: dict[int, Group], trajectory: Callable[..., Group]
+) -> None:
     """The first frame of a part, of which nothing is averaged yet, is the last one of the part before."""
     parts = trajectory(_hopping(20, segment="0.05 s"))
     assert len({segment for segment, _ in parts.motion.frames}) == 3
@@ -482,9 +598,18 @@ def test_a_run_in_parts_has_the_same_means(groups: dict[int, Group], trajectory:
 
 def _shipped(angle: float = 0.0, **drive: Any) -> Case:
     """The shipped walker alone, started at an angle in degrees, with other values of the drive."""
-    start = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 1, "angle": f"{angle} deg", "spacing": "80 mm"}
-    tables = {name: table for name, table in read_toml(shipped("case")["fig1b"]).items() if name != "run"}
-    return build_case({**tables, "dimers": start, "drive": {**tables["drive"], **drive}}, name="shipped")
+    start = {
+        "radii": ["0.3 mm", "0.2 mm"],
+        "replicates": 1,
+        "angle": f"{angle} deg",
+        "spacing": "80 mm",
+    }
+    tables = {
+        name: table for name, table in read_toml(shipped("case")["fig1b"]).items() if name != "run"
+    }
+    return build_case(
+        {**tables, "dimers": start, "drive": {**tables["drive"], **drive}}, name="shipped"
+    )
 
 
 def _turning() -> Case:
@@ -492,11 +617,15 @@ def _turning() -> Case:
     return _shipped(4.0, peak_acceleration="8 g").put("liquid.viscosity_ratio", 0.1)
 
 
-def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(directory: Path, runs_folder: Path) -> None:
+def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(
+    directory: Path, runs_folder: Path
+) -> None:
     case = load_case("fig1b")
     full = case.but(run=case.run.but(until_steady=False, cycles_per_segment=case.run.cycles))
     both = [walkers.load(directory), walkers.run(full, runs_folder)]
-    lengths = [[run.result[name] for name in ("cycles", "settling_cycles", "ended_early")] for run in both]
+    lengths = [
+        [run.result[name] for name in ("cycles", "settling_cycles", "ended_early")] for run in both
+    ]
     assert lengths == [[12, 4, True], [60, 20, False]]
     assert both[0].result["velocity"] == pytest.approx(both[1].result["velocity"], rel=0.005)
     # Until then the two are the same run.
@@ -539,7 +668,9 @@ def test_a_restless_walker_is_driven_for_longer_at_a_stretch(tmp_path: Path) -> 
         ({"run": {"settling_cycles": 30}}, (False, 60, 30)),
     ],
 )
-def test_what_settles_slowly_runs_in_full_and_numbers_are_obeyed(changes: dict[str, Any], expected: Any) -> None:
+def test_what_settles_slowly_runs_in_full_and_numbers_are_obeyed(
+    changes: dict[str, Any], expected: Any
+) -> None:
     run = build_case({**document(**changes), "run": changes.get("run", {})}, name="test").run
     assert (run.until_steady, run.cycles, run.settling_cycles) == expected
 
@@ -558,7 +689,9 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
     together = make_runs(cases, tmp_path / "together", find_engine())
     assert {*together.values()} == {True}
     decks = [read_manifest(tmp_path / "together" / name).get("shared_deck") for name in together]
-    assert len({deck["first"] if deck else None for deck in decks}) == 2  # the second has the one that went on
+    assert (
+        len({deck["first"] if deck else None for deck in decks}) == 2
+    )  # the second has the one that went on
     cycles = {}
     for one in cases:
         (name,) = make_runs([one], tmp_path / "alone", find_engine())
@@ -576,21 +709,29 @@ def test_each_file_has_what_is_declared(run_directory: Callable[..., Path], pile
     """Of six dimers, of dimers that may meet, of one with a ramp, and of a pile."""
     meeting = {"replicates": 4, "spacing": "1.6 mm", "meet": True}
     tray = run_directory(dimers=meeting, run={"cycles": 4, "settling_cycles": 1})
-    ramped = run_directory(drive={"ramp": [["0 s", 1], ["0.2 s", 0]]}, run={"cycles": 30, "settling_cycles": 1})
+    ramped = run_directory(
+        drive={"ramp": [["0 s", 1], ["0.2 s", 0]]}, run={"cycles": 30, "settling_cycles": 1}
+    )
     runs = (run_directory(load_case("fig1b")), tray, ramped, pile_run)
     files = {path.stem: path for run in runs for path in run.glob("*.parquet")}
     assert files.keys() == TABLES.keys()
     for name, path in files.items():
         schema, known = pq.read_schema(path), TABLES[name]
         places = [
-            next(place for place, one in enumerate(known) if matches(one.name, column)) for column in schema.names
+            next(place for place, one in enumerate(known) if matches(one.name, column))
+            for column in schema.names
         ]
         assert places == sorted(places)
         assert set(places) == set(range(len(known)))
         for field in schema:
             quantity = declared(field.name, name)
             unit, label = quantity.si_unit.encode(), quantity.label.encode()
-            expected = {b"unit": unit, b"units": unit, b"long_name": label, b"meaning": quantity.meaning.encode()}
+            expected = {
+                b"unit": unit,
+                b"units": unit,
+                b"long_name": label,
+                b"meaning": quantity.meaning.encode(),
+            }
             assert field.metadata == expected
         assert read_table(path.parent, name).attrs["units"].keys() == set(schema.names)
     # Of a walker there are rows of 20 samples and 3 bridges a cycle.

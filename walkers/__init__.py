@@ -15,7 +15,19 @@ if TYPE_CHECKING:
     from walkers.inputs.new import new
     from walkers.inputs.reading import load_case
 
-__all__ = ["Run", "Sweep", "calibrate", "climb", "compare", "load", "load_case", "new", "predict", "run", "sweep"]
+__all__ = [
+    "Run",
+    "Sweep",
+    "calibrate",
+    "climb",
+    "compare",
+    "load",
+    "load_case",
+    "new",
+    "predict",
+    "run",
+    "sweep",
+]
 
 DEFAULT_OUT = Path("runs")
 RECORDS = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}

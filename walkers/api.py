@@ -41,7 +41,16 @@ from walkers.runs.by_hand import as_run, take_in
 from walkers.runs.comparison import Comparison, Side, compare_runs
 from walkers.runs.listing import run_text
 from walkers.runs.making import make_runs, progress_at
-from walkers.runs.names import Changes, Given, Reference, find, is_begun, not_a_run, readable_case, refusing
+from walkers.runs.names import (
+    Changes,
+    Given,
+    Reference,
+    find,
+    is_begun,
+    not_a_run,
+    readable_case,
+    refusing,
+)
 from walkers.runs.status import state_at, worst_status
 from walkers.sweeps import table as of_points
 from walkers.sweeps.accuracy import measure_accuracy
@@ -78,7 +87,9 @@ EXPORTS = {
 # --- names ------------------------------------------------------------------------------------------------------------
 
 
-def load(reference: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Run | Sweep:
+def load(
+    reference: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None
+) -> Run | Sweep:
     """Find a sweep, or a run, finished or not.
 
     `InputError` if it does not exist or cannot be read; `EngineFailure` if a case is given and no engine is installed.
@@ -122,7 +133,9 @@ def _run_of_case(named: Reference) -> Run:
     raise refused(name, f"no finished run in {named.folder}; first do: {command}")
 
 
-def directory_of(reference: str | Path, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Path:
+def directory_of(
+    reference: str | Path, out: str | Path = DEFAULT_OUT, changes: Changes = None
+) -> Path:
     """The directory that a user names, whatever it contains; for a case, the directory of its run."""
     named = find(reference, out, changes)
     return load(named).directory if named.means_case else named.path
@@ -136,8 +149,14 @@ class Pictures(list[Path]):
 
     def _repr_html_(self) -> str:
         """The contents of the files: a notebook keeps them. A PDF is shown by its name."""
-        shown = ((escape(path.name), guess_type(path)[0], b64encode(path.read_bytes()).decode()) for path in self)
-        return "".join(f'<p><img alt="{name}" src="data:{kind};base64,{content}">' for name, kind, content in shown)
+        shown = (
+            (escape(path.name), guess_type(path)[0], b64encode(path.read_bytes()).decode())
+            for path in self
+        )
+        return "".join(
+            f'<p><img alt="{name}" src="data:{kind};base64,{content}">'
+            for name, kind, content in shown
+        )
 
 
 @dataclass(frozen=True)
@@ -191,7 +210,11 @@ class Run:
     @property
     def _files(self) -> Path:
         """The directory that holds the files now."""
-        return self.directory if on_disk.is_finished(self.directory) else on_disk.unfinished(self.directory)
+        return (
+            self.directory
+            if on_disk.is_finished(self.directory)
+            else on_disk.unfinished(self.directory)
+        )
 
     @property
     def _state(self) -> str:
@@ -248,18 +271,28 @@ class Run:
             return f"<p>{escape(self.describe())}</p>"
         return result_html(self.result, self.origins)
 
-    def plot(self, to: str | Path | None = None, formats: str | Sequence[str] = ("png",)) -> Pictures:
+    def plot(
+        self, to: str | Path | None = None, formats: str | Sequence[str] = ("png",)
+    ) -> Pictures:
         """Draw the figures and return their files; see `walkers.postprocess.show.figures.plot_run`."""
         return Pictures(plot_run(self.finished_directory, _path(to), formats))
 
-    def render(self, to: str | Path | None = None, *, images: int = 6, walker: int | None = None) -> Pictures:
+    def render(
+        self, to: str | Path | None = None, *, images: int = 6, walker: int | None = None
+    ) -> Pictures:
         """Render pictures at several times; see `walkers.postprocess.show.series.render_series`."""
-        return Pictures(render_series(self.finished_directory, _path(to), images=images, walker=walker))
+        return Pictures(
+            render_series(self.finished_directory, _path(to), images=images, walker=walker)
+        )
 
-    def film(self, to: str | Path | None = None, *, progress: bool | None = None, **options: Any) -> Path:
+    def film(
+        self, to: str | Path | None = None, *, progress: bool | None = None, **options: Any
+    ) -> Path:
         """Render a film with `walkers.postprocess.show.film_options.FilmOptions`, such as ``slowdown``."""
         with progress_of(self.case.name, progress) as advance:
-            return render_film(self.finished_directory, _path(to), FilmOptions(**options), on_progress=advance)
+            return render_film(
+                self.finished_directory, _path(to), FilmOptions(**options), on_progress=advance
+            )
 
     def view(self, *, height: int = 480) -> k3d.Plot:
         """An interactive 3-D view of the beads for a notebook, ``height`` pixels high.
@@ -284,7 +317,9 @@ class Run:
         figures = figures_of_spread(self.finished_directory)
         return report_run(self.finished_directory, _path(to), self.origins, figures=figures)
 
-    def spread(self, points: int = 32, *, progress: bool | None = None, engine: str | None = None) -> Spread:
+    def spread(
+        self, points: int = 32, *, progress: bool | None = None, engine: str | None = None
+    ) -> Spread:
         """Run the case with uncertain values drawn from their ranges; see `walkers.sweeps.spread.run_spread`."""
         case = self.requested or self.case
         with progress_of(f"{case.name}, spread", progress) as advance:
@@ -297,7 +332,9 @@ class Run:
                 on_progress=advance,
             )
 
-    def accuracy(self, *, progress: bool | None = None, engine: str | None = None) -> dict[str, Any]:
+    def accuracy(
+        self, *, progress: bool | None = None, engine: str | None = None
+    ) -> dict[str, Any]:
         """Measure the numerical errors, for the result; see `walkers.sweeps.accuracy.measure_accuracy`.
 
         Examples
@@ -307,7 +344,9 @@ class Run:
         0.002
         """
         with progress_of(f"{self.case.name}, accuracy", progress) as advance:
-            return measure_accuracy(self.finished_directory, Options(), engine=engine, on_progress=advance)
+            return measure_accuracy(
+                self.finished_directory, Options(), engine=engine, on_progress=advance
+            )
 
     def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
         """Write the run for other programs; the functions of `EXPORTS` take the options, such as ``every``.
@@ -322,7 +361,9 @@ class Run:
         """
         write, place = writer_of(form, options), _path(to)
         if form == "deck":
-            return write(as_run(self.case, self.directory), place or Path(f"{self.directory.name}-deck"))
+            return write(
+                as_run(self.case, self.directory), place or Path(f"{self.directory.name}-deck")
+            )
         return write(self.finished_directory, place, **options)
 
 
@@ -336,7 +377,9 @@ def writer_of(form: str, options: Iterable[str] = ()) -> Callable[..., Path]:
         raise refused("form", f"{form!r}: {expected_of(form, EXPORTS)}")
     for option in options:
         if not takes(form, option):
-            raise refused(option, f"is for --to {', '.join(name for name in EXPORTS if takes(name, option))}")
+            raise refused(
+                option, f"is for --to {', '.join(name for name in EXPORTS if takes(name, option))}"
+            )
     write: Callable[..., Path] = resolve_name(EXPORTS[form])
     return write
 
@@ -395,7 +438,9 @@ def run(
         return _measured(Run(place, requested=case))
     check_audit(binary)
     with progress_of(case.name, progress) as advance:
-        runs = make_runs([case], out, binary, force=force, on_progress=advance, time_limit=time_limit)
+        runs = make_runs(
+            [case], out, binary, force=force, on_progress=advance, time_limit=time_limit
+        )
     if not runs:
         raise RunBusy("another process is still running this case", on_disk.unfinished(place))
     return Run(place, cached=not runs[place.name], requested=case)
@@ -502,7 +547,9 @@ class Sweep:
         if in_notebook():
             import matplotlib.pyplot as plt
 
-            plt.switch_backend(plt.rcParams["backend"])  # which tells the notebook how to show figures
+            plt.switch_backend(
+                plt.rcParams["backend"]
+            )  # which tells the notebook how to show figures
         return _figure(self._table, options)
 
     def plot(self, to: str | Path | None = None, **options: Any) -> Pictures:
@@ -512,18 +559,24 @@ class Sweep:
         check_place(place, *(f".{form}" for form in FORMATS))
         runs = [Path(run).name for run in table.finished["run"]]
         form = place.suffix.lower()[1:]
-        return Pictures(save_figure(_figure(table, options), place, runs, form, str(table.frame.attrs["sweep"])))
+        return Pictures(
+            save_figure(_figure(table, options), place, runs, form, str(table.frame.attrs["sweep"]))
+        )
 
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report, by default ``report.html`` in the sweep's directory."""
         return report_sweep(self._table, _path(to) or self.directory / REPORT_NAME)
 
-    def export(self, form: Export = "archive", to: str | Path | None = None, **options: Any) -> Path:
+    def export(
+        self, form: Export = "archive", to: str | Path | None = None, **options: Any
+    ) -> Path:
         """Write the sweep and its runs as an ``archive``, the only form; see `Run.export`."""
         from walkers.archive.writing import write_archive
 
         if form != "archive":
-            raise refused(self.directory, f"is a sweep: expected one of its runs for {form}, or archive")
+            raise refused(
+                self.directory, f"is a sweep: expected one of its runs for {form}, or archive"
+            )
         return write_archive(self.directory, _path(to), **options)
 
 
@@ -584,8 +637,12 @@ def sweep(
     failed = {failure.point for failure in failures}
     for number, case in enumerate(points.cases(), 1) if spread else ():
         if number - 1 not in failed:
-            with progress_of(f"{points.name}, spread {number} of {len(points.rows)}", progress) as advance:
-                drawn = run_spread(case, folder, options, points=spread, engine=engine, on_progress=advance)
+            with progress_of(
+                f"{points.name}, spread {number} of {len(points.rows)}", progress
+            ) as advance:
+                drawn = run_spread(
+                    case, folder, options, points=spread, engine=engine, on_progress=advance
+                )
             failures += drawn.failures
     return Sweep(record.directory, tuple(failures))
 
@@ -651,7 +708,9 @@ def climb(
             if left:
                 text = f"{left} of {len(table.frame)} points are not finished and left out"
                 warnings.warn(f"{directory.name}: {text}", stacklevel=2)
-            conditions = [(label, table.results_of(rows)) for label, rows in conditions_in(table.frame)]
+            conditions = [
+                (label, table.results_of(rows)) for label, rows in conditions_in(table.frame)
+            ]
         else:
             conditions = [("", [results.read(directory)])]
         for label, of_piles in conditions:

@@ -37,7 +37,9 @@ def cache_folder() -> Path:
     """Path of the folder, without symbolic links; it may not exist, or be impossible to make."""
     try:
         return user_cache_path("granular-walkers").resolve()
-    except RuntimeError:  # neither XDG_CACHE_HOME nor HOME, and a user whom the system does not know
+    except (
+        RuntimeError
+    ):  # neither XDG_CACHE_HOME nor HOME, and a user whom the system does not know
         return _NOWHERE
 
 
@@ -139,7 +141,9 @@ def place_of_numbers(kind: str, key: bytes) -> Path:
     return cache_folder() / kind / f"{sha256(key).hexdigest()[:24]}.bin"
 
 
-def kept_numbers(place: Path, compute: Callable[[], npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
+def kept_numbers(
+    place: Path, compute: Callable[[], npt.NDArray[np.float64]]
+) -> npt.NDArray[np.float64]:
     """Numbers that are kept at a place of the cache.
 
     Parameters

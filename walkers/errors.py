@@ -44,7 +44,9 @@ class Problem:
     expected: str
 
     def __str__(self) -> str:
-        where = " = ".join(shortened(printable(part)) for part in (self.key, self.value) if part is not None)
+        where = " = ".join(
+            shortened(printable(part)) for part in (self.key, self.value) if part is not None
+        )
         expected = shortened(printable(self.expected), _LONGEST_TEXT)
         return f"{where}: {expected}" if where else expected
 
@@ -88,7 +90,9 @@ class InputErrors(InputError):
     """
 
     def __init__(self, errors: Sequence[InputError]) -> None:
-        super().__init__(errors[0].source, [problem for error in errors for problem in error.problems])
+        super().__init__(
+            errors[0].source, [problem for error in errors for problem in error.problems]
+        )
         self.errors = tuple(errors)
 
     def __reduce__(self) -> tuple[type[InputErrors], tuple[Sequence[InputError]]]:
@@ -143,7 +147,11 @@ def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
 def check_limits(name: str, value: float | None, low: float, high: float = inf) -> None:
     """Refuse an argument that is given and not within its limits."""
     if value is not None and not low <= value <= high:
-        raise refused(name, f"{value:g}: expected " + (f"{low:g} to {high:g}" if high < inf else f"{low:g} or more"))
+        raise refused(
+            name,
+            f"{value:g}: expected "
+            + (f"{low:g} to {high:g}" if high < inf else f"{low:g} or more"),
+        )
 
 
 def check_utf8(word: str | Path) -> None:
@@ -164,7 +172,11 @@ def expected_of(word: str, names: Iterable[str]) -> str:
 def suggestion(word: str, names: Iterable[str]) -> str:
     """``; did you mean "…"?`` with the names that contain the word or begin it, and the most similar one; or empty."""
     names, folded = list(names), word.casefold()
-    alike = (name for name in names if folded in name.casefold() or folded.startswith(f"{name.casefold()} "))
+    alike = (
+        name
+        for name in names
+        if folded in name.casefold() or folded.startswith(f"{name.casefold()} ")
+    )
     holding = sorted(alike, key=len) if len(word) > 2 else []
     near = dict.fromkeys([*holding, *difflib.get_close_matches(word, names, n=1, cutoff=0.6)])
     return "; did you mean " + " or ".join(f'"{name}"' for name in near) + "?" if near else ""

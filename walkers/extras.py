@@ -29,7 +29,9 @@ class ExtraMissing(InputError):
         self.extra = extra
         self.missing = missing
         how = f"make extras, or pip install 'granular-walkers[{extra}]'"
-        super().__init__(EXTRAS[extra][0], [Problem("", None, f"needs {', '.join(missing)}: {how}")])
+        super().__init__(
+            EXTRAS[extra][0], [Problem("", None, f"needs {', '.join(missing)}: {how}")]
+        )
 
     def __reduce__(self) -> tuple[type[ExtraMissing], tuple[str, list[str]]]:
         """How it is made again in another process."""
@@ -45,7 +47,9 @@ class ExtraMissing(InputError):
 
 def require(extra: str) -> None:
     """Raise `ExtraMissing` unless the packages of an extra are installed; none of them is imported."""
-    if missing := [package for package in EXTRAS[extra][1] if find_spec(module_of(package)) is None]:
+    if missing := [
+        package for package in EXTRAS[extra][1] if find_spec(module_of(package)) is None
+    ]:
         raise ExtraMissing(extra, missing)
 
 

@@ -143,7 +143,10 @@ def beside(path: Path) -> Iterator[Path]:
         yield new
         new.replace(path)
     except BaseException as error:
-        if isinstance(error, OSError) and error.filename in (None, str(new)):  # errors of a full disk name no file
+        if isinstance(error, OSError) and error.filename in (
+            None,
+            str(new),
+        ):  # errors of a full disk name no file
             error.filename = str(path)
         with suppress(OSError):
             new.unlink(missing_ok=True)

@@ -54,11 +54,15 @@ def _on_signal(number: int, _frame: FrameType | None) -> NoReturn:
 def main(arguments: list[str] | None = None, app: App | None = None) -> NoReturn:
     """Run the program, or another app of `new_app`, with the arguments of the command line, and exit."""
     _prepare_streams()
-    os.environ["MPLBACKEND"] = "agg"  # the program opens no windows, and matplotlib refuses unknown names
+    os.environ["MPLBACKEND"] = (
+        "agg"  # the program opens no windows, and matplotlib refuses unknown names
+    )
     signal.signal(signal.SIGTERM, _on_signal)
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
         signal.signal(signal.SIGHUP, _on_signal)
-    warnings.showwarning = lambda message, *_, **__: print(f"walkers: warning: {message}", file=sys.stderr)
+    warnings.showwarning = lambda message, *_, **__: print(
+        f"walkers: warning: {message}", file=sys.stderr
+    )
     sys.exit(_status(sys.argv[1:] if arguments is None else arguments, app))
 
 
@@ -109,7 +113,11 @@ def _print_panel(title: str, meanings: Mapping[str, str]) -> None:
     print(f"\n{title}:")
     for name, meaning in meanings.items():
         first, *more = textwrap.wrap(meaning, _WIDE - left - 4) or [""]
-        lines = [f"  {name:{left}}  {first}"] if len(name) <= left else [f"  {name}", f"{'':{left + 4}}{first}"]
+        lines = (
+            [f"  {name:{left}}  {first}"]
+            if len(name) <= left
+            else [f"  {name}", f"{'':{left + 4}}{first}"]
+        )
         print("\n".join([*lines, *(f"{'':{left + 4}}{line}" for line in more)]))
 
 
@@ -120,7 +128,9 @@ class _PlainHelp:
         meanings = {}
         for entry in panel.entries:
             default = f" [default: {entry.default}]" * (entry.default not in (None, "False"))
-            meanings[", ".join(entry.display_labels_with_metavar)] = _plain(entry.description) + default
+            meanings[", ".join(entry.display_labels_with_metavar)] = (
+                _plain(entry.description) + default
+            )
         _print_panel(str(panel.title), meanings)
 
     def render_usage(self, _console: object, _options: object, usage: Any) -> None:
@@ -179,7 +189,9 @@ def print_version() -> None:
     from walkers.runner.provenance import PROJECT, software
 
     ours = software()
-    package = f"{PROJECT} {ours['granular_walkers']}" + (f" (commit {ours['commit']})" if ours["commit"] else "")
+    package = f"{PROJECT} {ours['granular_walkers']}" + (
+        f" (commit {ours['commit']})" if ours["commit"] else ""
+    )
     print(package)
     try:
         path = find_engine().path
@@ -187,9 +199,18 @@ def print_version() -> None:
         print(missing)
         return
     version, command = None, [str(path), "-log", "none", "-in", "/dev/null"]
-    with TemporaryDirectory() as folder, suppress(OSError, subprocess.TimeoutExpired):  # it writes files there
-        how: dict[str, Any] = {"cwd": folder, "stdin": subprocess.DEVNULL, "timeout": _ENGINE_SECONDS}
-        version = version_in(subprocess.run(command, capture_output=True, check=False, **how).stdout)
+    with (
+        TemporaryDirectory() as folder,
+        suppress(OSError, subprocess.TimeoutExpired),
+    ):  # it writes files there
+        how: dict[str, Any] = {
+            "cwd": folder,
+            "stdin": subprocess.DEVNULL,
+            "timeout": _ENGINE_SECONDS,
+        }
+        version = version_in(
+            subprocess.run(command, capture_output=True, check=False, **how).stdout
+        )
     print(f"{version or 'an engine that does not name its version'}, {path}")
 
 
@@ -199,7 +220,9 @@ def _report_stop(stop: BaseException, tokens: list[str], app: App) -> int:
     if isinstance(stop, SystemExit):
         return stop.code if isinstance(stop.code, int) else 0
     if isinstance(stop, InputError):
-        stop = stop.renamed(lambda source: source if source in tokens else _options_of(source, tokens, app))
+        stop = stop.renamed(
+            lambda source: source if source in tokens else _options_of(source, tokens, app)
+        )
     if isinstance(stop, _Terminated):
         return _tell(str(stop), stop.status)
     statuses = {InputError: 2, WalkersError: 1, KeyboardInterrupt: _INTERRUPTED}
@@ -215,7 +238,11 @@ def _report_stop(stop: BaseException, tokens: list[str], app: App) -> int:
         raise stop
     unused = stop.unused_tokens if isinstance(stop, UnusedCliTokensError) else None
     message = f"Unexpected: {' '.join(unused)}." if unused else str(stop)
-    if isinstance(stop, MissingArgumentError) and stop.argument and (choices := stop.argument.get_choices()):
+    if (
+        isinstance(stop, MissingArgumentError)
+        and stop.argument
+        and (choices := stop.argument.get_choices())
+    ):
         message += f" Choose from: {', '.join(choices)}."
     help_command = " ".join([*app.name, *(stop.command_chain or ()), "--help"])
     return _tell(f"{shortened(printable(message), _LONGEST_MESSAGE)} See: {help_command}", 2)

@@ -49,7 +49,11 @@ def progress_of(name: str, shown: bool | None = True) -> Iterator[Tell | None]:
     if not (notebook if shown is None else shown):
         yield None
         return
-    stream, begin, due = sys.stdout if notebook else sys.stderr, time.monotonic(), _FIRST_LINE_SECONDS
+    stream, begin, due = (
+        sys.stdout if notebook else sys.stderr,
+        time.monotonic(),
+        _FIRST_LINE_SECONDS,
+    )
     in_place, wide = notebook or stream.isatty(), shutil.get_terminal_size().columns - 1
 
     def show(progress: Progress) -> None:
@@ -57,7 +61,12 @@ def progress_of(name: str, shown: bool | None = True) -> Iterator[Tell | None]:
         elapsed = time.monotonic() - begin
         if in_place:
             bar = "━" * round(_BAR * progress.share)
-            print(f"\r{f'{name} {bar:─<{_BAR}} {progress.text}'[:wide]:{wide}}", end="", file=stream, flush=True)
+            print(
+                f"\r{f'{name} {bar:─<{_BAR}} {progress.text}'[:wide]:{wide}}",
+                end="",
+                file=stream,
+                flush=True,
+            )
         elif elapsed >= due:  # lines become rarer with time
             due = elapsed + min(elapsed, _LONGEST_SILENCE_SECONDS)
             print(f"{name}: {progress.text}", file=stream, flush=True)

@@ -68,7 +68,9 @@ def counted(number: int, noun: str) -> str:
 
 def duration_text(seconds: float) -> str:
     """A time in the largest unit that gives at least 2, such as ``3 d``."""
-    texts = (f"{seconds / size:.0f} {unit}" for unit, size in _LONGER.items() if seconds >= 2 * size)
+    texts = (
+        f"{seconds / size:.0f} {unit}" for unit, size in _LONGER.items() if seconds >= 2 * size
+    )
     return next(texts, f"{seconds:.0f} s")
 
 

@@ -30,14 +30,19 @@ def printable(text: str) -> str:
     >>> printable("one\ntwo \x1b[31m")
     'one two \\x1b[31m'
     """
-    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in " ".join(text.split()))
+    return "".join(
+        letter if letter.isprintable() else repr(letter)[1:-1] for letter in " ".join(text.split())
+    )
 
 
 def aligned(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
     """Rows of cells as text with aligned columns, those with the numbers ``right`` at their right ends."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     justify = [str.rjust if number in right else str.ljust for number in range(len(widths))]
-    filled = ([fill(cell, width) for fill, cell, width in zip(justify, row, widths, strict=True)] for row in rows)
+    filled = (
+        [fill(cell, width) for fill, cell, width in zip(justify, row, widths, strict=True)]
+        for row in rows
+    )
     return "\n".join("  ".join(row).rstrip() for row in filled)
 
 

@@ -37,7 +37,14 @@ if TYPE_CHECKING:
 
 FOLDER = Path(__file__).parents[1] / "reference" / "generated"
 
-_BOUNDS = {"gt": ">", "ge": "≥", "lt": "<", "le": "≤", "min_length": "length ≥", "max_length": "length ≤"}
+_BOUNDS = {
+    "gt": ">",
+    "ge": "≥",
+    "lt": "<",
+    "le": "≤",
+    "min_length": "length ≥",
+    "max_length": "length ≤",
+}
 _PAGE = re.compile(r"docs/(\S+?\.md)")
 
 
@@ -67,11 +74,18 @@ def _expected(hint: Any) -> str:
     if get_origin(hint) is Literal:
         return "one of " + ", ".join(f'`"{value}"`' for value in get_args(hint))
     if get_origin(hint) in (Union, types.UnionType):
-        return " or ".join(_expected(member) for member in get_args(hint) if member is not types.NoneType)
+        return " or ".join(
+            _expected(member) for member in get_args(hint) if member is not types.NoneType
+        )
     if get_origin(hint) is tuple:
         number = "" if ... in get_args(hint) else f" of {len(get_args(hint))}"
         return f"a list{number}, each {_expected(get_args(hint)[0])}"
-    words = {str: "text", bool: "true or false", int: "a whole number", float: "a plain number without a unit"}
+    words = {
+        str: "text",
+        bool: "true or false",
+        int: "a whole number",
+        float: "a plain number without a unit",
+    }
     return words.get(hint, "a table")
 
 
@@ -81,7 +95,9 @@ def _refusal(validator: BeforeValidator | Kind) -> str | None:
         words = validator.expectation.removeprefix("expected ").partition(", such as")[0]
         if validator.unit == "rad" and validator.largest > 10.0:  # any angle
             return words
-        either = "" if validator.sign or validator.unit == TEMPERATURE.unit else " in absolute value"
+        either = (
+            "" if validator.sign or validator.unit == TEMPERATURE.unit else " in absolute value"
+        )
         return f"{words}; {low.split()[0]} to {high}{either}"
     try:
         validator.func(object())  # type: ignore[call-arg]
@@ -92,7 +108,9 @@ def _refusal(validator: BeforeValidator | Kind) -> str | None:
 
 def _in_unit(value: float, kind: Kind) -> str:
     """A value in the unit of its kind's example, four digits; accelerations, of which gravity is one, in m/s²."""
-    number, unit = (value, kind.unit) if kind.unit == ACCELERATION.unit else quantity_text(value, kind).split()
+    number, unit = (
+        (value, kind.unit) if kind.unit == ACCELERATION.unit else quantity_text(value, kind).split()
+    )
     return f"{float(f'{float(number):.4g}'):g} {unit}"
 
 
@@ -109,7 +127,12 @@ def _row(name: str, field: FieldInfo, *, supplied: bool) -> tuple[str, str, str,
     example = example_of(field).removeprefix("a value ")
     expected = _expected(Annotated[field.annotation, *field.metadata, "at least one annotation"])
     expected += f"; {example}" if example.startswith("such as") and example not in expected else ""
-    return f"`{name}`", str(field.description), expected, "from the library" if supplied else _default(field)
+    return (
+        f"`{name}`",
+        str(field.description),
+        expected,
+        "from the library" if supplied else _default(field),
+    )
 
 
 def tables_of_keys(model: type[Table] = CaseFile, place: str = "") -> Iterator[tuple[str, str]]:
@@ -121,8 +144,12 @@ def tables_of_keys(model: type[Table] = CaseFile, place: str = "") -> Iterator[t
     rows = (_row(name, fields[name], supplied=f"{path}{name}" in SUPPLIED) for name in keys)
     text = markdown(["key", "meaning", "expects", "default"], rows)
     for choice in model.choices:
-        alternatives = "; ".join(" and ".join(f"`{name}`" for name in names) for names in choice.expressions)
-        supplied = any(f"{path}{name}" in SUPPLIED for names in choice.expressions for name in names)
+        alternatives = "; ".join(
+            " and ".join(f"`{name}`" for name in names) for names in choice.expressions
+        )
+        supplied = any(
+            f"{path}{name}" in SUPPLIED for names in choice.expressions for name in names
+        )
         text += f"\n{'Exactly' if choice.required and not supplied else 'At most'} one of: {alternatives}.\n"
     yield place or "Top level", text
     for name, inner in below.items():
@@ -145,7 +172,12 @@ _SWEEPS = """
 The first columns are the keys that vary.
 
 """
-_GROUPS = {"walking": "Walkers", "meetings": "Walkers that may meet", "piles": "Piles", "drive": "All sweeps"}
+_GROUPS = {
+    "walking": "Walkers",
+    "meetings": "Walkers that may meet",
+    "piles": "Piles",
+    "drive": "All sweeps",
+}
 
 
 def _keys() -> str:
@@ -153,7 +185,9 @@ def _keys() -> str:
     keys = "".join(f"\n### {place}\n\n{table}" for place, table in tables_of_keys())
     runs = "\n".join(_described(name, quantities) for name, quantities in TABLES.items())
     sweeps = "\n".join(_described(title, GROUPS[group]) for group, title in _GROUPS.items())
-    status = "".join(f"| `{name}` | {unit} | {meaning} |\n" for name, (unit, meaning) in STATE.items())
+    status = "".join(
+        f"| `{name}` | {unit} | {meaning} |\n" for name, (unit, meaning) in STATE.items()
+    )
     return f"{_KEYS}{keys}{_COLUMNS}{runs}{_SWEEPS}{sweeps}{status}"
 
 
@@ -171,17 +205,28 @@ def _library() -> str:
     for kind in ("materials", "liquids", "surface pairs"):
         text += f"\n## {kind.capitalize()}\n"
         for entry in (entry for entry in entries if entry.kind == kind):
-            linked = {key: _PAGE.sub(r"[docs/\1](../../\1)", number.source) for key, number in entry.numbers.items()}
+            linked = {
+                key: _PAGE.sub(r"[docs/\1](../../\1)", number.source)
+                for key, number in entry.numbers.items()
+            }
             rows = ((*_numbers(key, number), linked[key]) for key, number in entry.numbers.items())
             table = markdown(["", "value", "range", "source"], rows)
             text += f"\n### {entry.name}\n\n{entry.text}\n\n{table}"
-    defaults = {entry.name: entry.numbers["default"] for entry in entries if entry.kind == "not measured"}
+    defaults = {
+        entry.name: entry.numbers["default"] for entry in entries if entry.kind == "not measured"
+    }
     guesses = (_numbers(*default) for default in defaults.items())
-    return f"{text}\n## Not measured\n\n{NOT_KNOWN}\n\n{markdown(['', 'default', 'range'], guesses)}"
+    return (
+        f"{text}\n## Not measured\n\n{NOT_KNOWN}\n\n{markdown(['', 'default', 'range'], guesses)}"
+    )
 
 
 def _numbers(key: str, number: LibraryNumber) -> tuple[str, str, str]:
-    return f"`{key}`", str(number.written), f"{number.range[0]} to {number.range[1]}" if number.range else ""
+    return (
+        f"`{key}`",
+        str(number.written),
+        f"{number.range[0]} to {number.range[1]}" if number.range else "",
+    )
 
 
 def _shipped() -> str:
@@ -219,7 +264,9 @@ def _commands() -> str:
         head, page = " ".join(["walkers", *words]), io.StringIO()
         with redirect_stdout(page):
             app([*words, "--help"]) if words else print_help()
-        text += f"\n## {head}\n" * bool(words) + f"\n```text\n$ {head} --help\n{page.getvalue()}```\n"
+        text += (
+            f"\n## {head}\n" * bool(words) + f"\n```text\n$ {head} --help\n{page.getvalue()}```\n"
+        )
     return text
 
 

@@ -20,4 +20,6 @@ def scraper(_block: Any, variables: dict[str, Any], configuration: dict[str, Any
         place = Path(next(variables["image_path_iterator"])).with_suffix(Path(file).suffix)
         places.append(str(shutil.copy(file, place)))
         variables["example_globals"]["___"] = None  # not as text too
-    return str(figure_rst(places, configuration["src_dir"], srcsetpaths=[{0: place} for place in places]))
+    return str(
+        figure_rst(places, configuration["src_dir"], srcsetpaths=[{0: place} for place in places])
+    )

@@ -13,16 +13,23 @@ _FILE = "texts.js"
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 
 
-def _load(app: Sphinx, page: str, _template: str, _context: dict[str, Any], _doctree: object) -> None:
+def _load(
+    app: Sphinx, page: str, _template: str, _context: dict[str, Any], _doctree: object
+) -> None:
     if page == "search":
         app.add_js_file(_FILE)
 
 
 def _write(app: Sphinx, error: Exception | None) -> None:
     if error is None and app.builder.format == "html":
-        texts = ((name, _COMMENT.sub("", app.env.get_doctree(name).astext())) for name in app.env.found_docs)
+        texts = (
+            (name, _COMMENT.sub("", app.env.get_doctree(name).astext()))
+            for name in app.env.found_docs
+        )
         pages = {name: " ".join(text.split()) for name, text in texts}
-        (Path(app.outdir) / "_static" / _FILE).write_text(f"const TEXTS = {json.dumps(pages)};\n", "utf-8")
+        (Path(app.outdir) / "_static" / _FILE).write_text(
+            f"const TEXTS = {json.dumps(pages)};\n", "utf-8"
+        )
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -19,12 +19,18 @@ walker = run.trajectory.query("walker == 0")
 cycles = walker[walker["cycle"] >= walker["cycle"].max() - 2.0]
 
 figure, (speeds, gaps) = plt.subplots(2, sharex=True, figsize=(7, 6))
-speeds.plot(cycles["cycle"], 1e3 * cycles["velocity"], "k", label="mass centre, relative to the substrate")
+speeds.plot(
+    cycles["cycle"], 1e3 * cycles["velocity"], "k", label="mass centre, relative to the substrate"
+)
 speeds.plot(cycles["cycle"], 1e3 * cycles["rotation_1"], "C0", label="rotation of the large bead")
 speeds.plot(cycles["cycle"], 1e3 * cycles["rotation_2"], "C1", label="rotation of the small bead")
 speeds.set(ylabel="velocity (mm/s)")
 speeds.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize="small", frameon=False)
-contacts = {"gap_1": "large bead on substrate", "gap_2": "small bead on substrate", "gap_pair_1": "bead on bead"}
+contacts = {
+    "gap_1": "large bead on substrate",
+    "gap_2": "small bead on substrate",
+    "gap_pair_1": "bead on bead",
+}
 for column, name in contacts.items():
     gaps.plot(cycles["cycle"], 1e6 * cycles[column], label=name)
 gaps.axhline(0.0, color="0.5", lw=0.8)

@@ -35,7 +35,9 @@ table = walkers.sweep("runs/threshold.toml").table()
 
 figure, axes = plt.subplots(figsize=(7, 4))
 for frequency, steps in table.groupby("drive.frequency"):
-    axes.plot(steps["drive.peak_acceleration"], 1e3 * steps["velocity"], "o-", label=f"{frequency:g} Hz")
+    axes.plot(
+        steps["drive.peak_acceleration"], 1e3 * steps["velocity"], "o-", label=f"{frequency:g} Hz"
+    )
 axes.set(xlabel="peak acceleration (g)", ylabel="velocity (mm/s)")
 axes.legend()
 plt.show()
@@ -44,6 +46,10 @@ plt.show()
 # In one run the drive falls by a ramp. The result has the drive at which the walkers stop; it is as exact as the drive
 # changes in eight cycles.
 
-falling = {"drive.peak_acceleration": "1.2 g", "drive.ramp": [["0 s", 1], ["1 s", 0.5]], "dimers.replicates": 2}
+falling = {
+    "drive.peak_acceleration": "1.2 g",
+    "drive.ramp": [["0 s", 1], ["1 s", 0.5]],
+    "dimers.replicates": 2,
+}
 result = walkers.run(walkers.load_case("fig1b", falling)).result
 print(f"they stop at {result['stops_at'] / 9.8:.2f} g, within {result['stops_within'] / 9.8:.2f} g")

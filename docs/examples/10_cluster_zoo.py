@@ -50,6 +50,11 @@ for panel, (arrangement, number) in zip(panels.flat, ZOO, strict=True):
     for (x, y), size in zip((places - places.mean(axis=0))[:, :2], radius, strict=True):
         panel.add_patch(plt.Circle((x, y), size, facecolor="0.85", edgecolor="0.3"))
     speed = 1e3 * run.result["velocity"]
-    panel.set(title=f"{arrangement} of {number}\n{speed:.2f} mm/s", xlim=(-0.9, 0.9), ylim=(-0.8, 0.8), aspect="equal")
+    panel.set(
+        title=f"{arrangement} of {number}\n{speed:.2f} mm/s",
+        xlim=(-0.9, 0.9),
+        ylim=(-0.8, 0.8),
+        aspect="equal",
+    )
     panel.set_axis_off()
 plt.show()

@@ -11,7 +11,9 @@ from IPython.display import Image
 import walkers
 
 run = walkers.run("fig4b")
-film = run.film("runs/walk.gif", size=(480, 240), fps=20, slowdown=50.0, walker=0, begin=0.05, end=0.1)
+film = run.film(
+    "runs/walk.gif", size=(480, 240), fps=20, slowdown=50.0, walker=0, begin=0.05, end=0.1
+)
 Image(film)
 
 # %%

@@ -10,7 +10,11 @@ import walkers
 
 sweep = walkers.sweep("fig3")
 table = sweep.table()
-print((1e3 * table[["radius_1", "radius_2", "velocity"]]).assign(sin_delta=table["sin_delta"]).to_string(index=False))
+print(
+    (1e3 * table[["radius_1", "radius_2", "velocity"]])
+    .assign(sin_delta=table["sin_delta"])
+    .to_string(index=False)
+)
 
 # %%
 sweep.plot("runs/fig3.png", x="sin_delta", theory=True)

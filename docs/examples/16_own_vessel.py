@@ -17,9 +17,13 @@ import walkers
 def turned(profile: list[tuple[float, float]], sides: int) -> meshio.Mesh:
     """A surface of revolution with this many sides, of radii and heights (mm) from the bottom to the rim."""
     angles = 2.0 * np.pi * np.arange(sides) / sides
-    points = [[radius * np.cos(at), radius * np.sin(at), z] for radius, z in profile for at in angles]
+    points = [
+        [radius * np.cos(at), radius * np.sin(at), z] for radius, z in profile for at in angles
+    ]
     rings = np.arange(len(points)).reshape(len(profile), sides)
-    quads = np.stack([rings[:-1], np.roll(rings[:-1], -1, 1), np.roll(rings[1:], -1, 1), rings[1:]], axis=-1)
+    quads = np.stack(
+        [rings[:-1], np.roll(rings[:-1], -1, 1), np.roll(rings[1:], -1, 1), rings[1:]], axis=-1
+    )
     return meshio.Mesh(points, [("quad", quads.reshape(-1, 4))])
 
 
@@ -49,13 +53,18 @@ rounds = np.pi * np.sqrt(1e-3 * (bowl - radius) / 9.81) * (1.0 + swing**2 / 16.0
 facets, heights, times = [], [], []
 for rings in (3, 6, 12):
     bends = np.linspace(0.0, np.pi / 2.0, rings + 1)
-    turned([(bowl * np.sin(at), bowl * (1.0 - np.cos(at))) for at in bends], 4 * rings).write("runs/bowl.obj")
+    turned([(bowl * np.sin(at), bowl * (1.0 - np.cos(at))) for at in bends], 4 * rings).write(
+        "runs/bowl.obj"
+    )
     out = bowl * np.cos(np.pi / 4.0 / rings) ** 2 - radius - 0.01  # so that it touches no facet
     case |= {
         "mixture": None,
         "boundary": {**case["boundary"], "mesh": "runs/bowl.obj"},
         "placed": [
-            {"radius": "0.3 mm", "at": [f"{out * np.sin(swing)} mm", "0 mm", f"{bowl - out * np.cos(swing)} mm"]}
+            {
+                "radius": "0.3 mm",
+                "at": [f"{out * np.sin(swing)} mm", "0 mm", f"{bowl - out * np.cos(swing)} mm"],
+            }
         ],
         "liquid": {"surface_tension": "1 uN/m", "dynamic_viscosity": "0 Pa*s"},
         "contact": {"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": 0.0},
@@ -67,7 +76,9 @@ for rings in (3, 6, 12):
     facets.append(len(motion.case.boundary.walls))
     heights.append(-across.min() / across[0])
     times.append(motion.time[across.argmin()] / rounds)
-    print(f"{facets[-1]} parts: back to {heights[-1]:.2f} of its distance, in {times[-1]:.2f} of the time")
+    print(
+        f"{facets[-1]} parts: back to {heights[-1]:.2f} of its distance, in {times[-1]:.2f} of the time"
+    )
 
 figure, axes = plt.subplots(figsize=(7, 4))
 axes.semilogx(facets, heights, "o-", label="distance on the other side")

@@ -15,7 +15,9 @@ app = new_app("python -m studies.literature")
 
 
 @app.default
-def literature(*only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAULT_OUT, as_json: Json = False) -> int:
+def literature(
+    *only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAULT_OUT, as_json: Json = False
+) -> int:
     """Compare engine and bridge laws with published benchmarks, exact solutions and a second engine.
 
     Parameters
@@ -27,7 +29,9 @@ def literature(*only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAUL
     from walkers.inputs.bridge_laws import ExecutedLawWarning
     from walkers.second_engine.lines import as_dict, as_text, failures, run_checks
 
-    warnings.simplefilter("ignore", ExecutedLawWarning)  # the experiments have bridge laws of their own
+    warnings.simplefilter(
+        "ignore", ExecutedLawWarning
+    )  # the experiments have bridge laws of their own
     lines = run_checks(LITERATURE, out, only, tell)
     print_as(as_json, lambda: as_dict(lines), lambda: as_text(lines))
     return 1 if failures(lines) else 0

@@ -62,12 +62,24 @@ class Benchmark:
     The speeds are those of `Speeds`, numbers and arrays that broadcast.
     """
 
-    def __init__(self, sphere: Sphere, *speeds: Any, e: float = 1.0, friction: float = 0.0, like: bool = False) -> None:
-        self.before = Speeds(*np.array(np.broadcast_arrays(*map(np.atleast_1d, speeds)), np.float64))
+    def __init__(
+        self,
+        sphere: Sphere,
+        *speeds: Any,
+        e: float = 1.0,
+        friction: float = 0.0,
+        like: bool = False,
+    ) -> None:
+        self.before = Speeds(
+            *np.array(np.broadcast_arrays(*map(np.atleast_1d, speeds)), np.float64)
+        )
         self.sphere, self.restitution, self.friction, self.like = sphere, e, friction, like
         self.closing = (2.0 if like else 1.0) * self.before.normal
         mass = sphere.density * 4.0 / 3.0 * pi * sphere.radius**3
-        halves, modulus = 2.0 if like else 1.0, reduced_modulus(sphere.youngs_modulus, sphere.poissons_ratio)
+        halves, modulus = (
+            2.0 if like else 1.0,
+            reduced_modulus(sphere.youngs_modulus, sphere.poissons_ratio),
+        )
         # At a rigid plane, E* = E/(1-ν²), twice the value for two bodies of this modulus.
         self.impact = Impact(mass / halves, sphere.radius / halves, 2.0 * modulus / halves)
         self.step = self.impact.duration(float(self.closing.max())) / _STEPS
@@ -82,17 +94,26 @@ class Benchmark:
         start[:, 3], start[:, 5], start[:, 7] = tangential, -normal, rolling / radius
         if self.like:  # far above the plane
             start[:, 2] += 6.0 * radius
-            start = np.concatenate([start, start * [1, 1, 1, -1, 1, -1, 1, -1, 1] - [0, 0, 2 * radius, *[0] * 6]])
+            start = np.concatenate(
+                [start, start * [1, 1, 1, -1, 1, -1, 1, -1, 1] - [0, 0, 2 * radius, *[0] * 6]]
+            )
         steps = ceil(_LONGEST * self.impact.duration(float(self.closing.min())) / self.step)
-        case = bench_case(DRY).put("beads.density", self.sphere.density).put("run.time_step", self.step)
+        case = (
+            bench_case(DRY)
+            .put("beads.density", self.sphere.density)
+            .put("run.time_step", self.step)
+        )
         contact = case.contact.but(
             friction=Friction(bead_bead=self.friction, bead_wall=self.friction),
             restitution=self.restitution,
-            youngs_modulus=(1.0 if self.like else 2.0) * self.sphere.youngs_modulus,  # the other side of a rigid plane
+            youngs_modulus=(1.0 if self.like else 2.0)
+            * self.sphere.youngs_modulus,  # the other side of a rigid plane
             poissons_ratio=self.sphere.poissons_ratio,
             roughness=Roughness(bead_bead=0.01 * radius, bead_wall=0.01 * radius),
         )
-        engine = SecondEngine(case.but(contact=contact), np.full(len(start), radius), start, walls=[FLOOR])
+        engine = SecondEngine(
+            case.but(contact=contact), np.full(len(start), radius), start, walls=[FLOOR]
+        )
         every = 1 if count == 1 else steps
         return engine.run(steps, every)[:, :count]
 
@@ -104,7 +125,12 @@ class Benchmark:
 
     def sliding(self) -> Speeds:
         """Speeds after an impact on the plane in which the surfaces slide all the time."""
-        impulse = self.friction * (1.0 + self.restitution) * self.before.normal * np.sign(self.before.sliding)
+        impulse = (
+            self.friction
+            * (1.0 + self.restitution)
+            * self.before.normal
+            * np.sign(self.before.sliding)
+        )
         normal, tangential, rolling = self.before
         return Speeds(self.restitution * normal, tangential - impulse, rolling + 2.5 * impulse)
 
@@ -134,8 +160,13 @@ TESTS: Mapping[str, Benchmark] = {
     "1: limestone": Benchmark(_LIMESTONE, 10.0, 0.0, 0.0, like=True),
     "2: alloy": Benchmark(Sphere(7.0e10, 0.30, 2699.0, 0.1), 0.2, 0.0, 0.0),
     "2: magnesium alloy": Benchmark(Sphere(4.0e10, 0.35, 1800.0, 0.1), 0.2, 0.0, 0.0),
-    **{f"3: oxide, {e:g}": Benchmark(_OXIDE, 3.9, 0.0, 0.0, e=e) for e in (0.2, 0.4, 0.6, 0.8, 1.0)},
-    **{f"3: cast iron, {e:g}": Benchmark(_IRON, 3.9, 0.0, 0.0, e=e) for e in (0.2, 0.4, 0.6, 0.8, 1.0)},
+    **{
+        f"3: oxide, {e:g}": Benchmark(_OXIDE, 3.9, 0.0, 0.0, e=e) for e in (0.2, 0.4, 0.6, 0.8, 1.0)
+    },
+    **{
+        f"3: cast iron, {e:g}": Benchmark(_IRON, 3.9, 0.0, 0.0, e=e)
+        for e in (0.2, 0.4, 0.6, 0.8, 1.0)
+    },
     "4: oxide": Benchmark(_OXIDE, *_OBLIQUE, e=0.98, friction=0.092),
     "4: alloy": Benchmark(Sphere(7.0e10, 0.33, 2700.0, 2.5e-3), *_OBLIQUE, e=0.98, friction=0.092),
     "5: steel": Benchmark(_STEEL, 5.0, _ALONG * 0.3 * 5.0, 0.0, friction=0.3),
@@ -165,20 +196,32 @@ _OF_TEST_4: dict[str, Callable[[Benchmark, Speeds], FloatArray]] = {
 }
 PANELS: Mapping[str, Panel] = {
     # A rigid sphere begins to slide all the time at tan 32.5° = 7/2 μ(1+e).
-    **{f"oxide-{name}": Panel("4: oxide", _DEGREES, y, (36.0, 90.0)) for name, y in _OF_TEST_4.items()},
     **{
-        f"alloy-{name}": Panel("4: alloy", _DEGREES, _OF_TEST_4[name], (36.0, 90.0)) for name in ("restitution", "spin")
+        f"oxide-{name}": Panel("4: oxide", _DEGREES, y, (36.0, 90.0))
+        for name, y in _OF_TEST_4.items()
     },
-    "steel-surface": Panel("5: steel", _ALONG, lambda _, after: after.sliding / (0.3 * after.normal), (7.0, 21.0)),
-    "steel-spin": Panel("5: steel", _ALONG, lambda _, after: -after.rolling / (0.3 * 5.0), (7.0, 21.0)),
-    "spin": Panel("6: alloy", _SPIN, lambda test, after: -after.sliding / test.before.sliding, (0.0, 0.9)),
+    **{
+        f"alloy-{name}": Panel("4: alloy", _DEGREES, _OF_TEST_4[name], (36.0, 90.0))
+        for name in ("restitution", "spin")
+    },
+    "steel-surface": Panel(
+        "5: steel", _ALONG, lambda _, after: after.sliding / (0.3 * after.normal), (7.0, 21.0)
+    ),
+    "steel-spin": Panel(
+        "5: steel", _ALONG, lambda _, after: -after.rolling / (0.3 * 5.0), (7.0, 21.0)
+    ),
+    "spin": Panel(
+        "6: alloy", _SPIN, lambda test, after: -after.sliding / test.before.sliding, (0.0, 0.9)
+    ),
 }
 """By key of ``chung_ooi.toml``."""
 
 
 def published() -> dict[str, Any]:
     """The panels of ``chung_ooi.toml``, points as arrays of shape (N, 2)."""
-    panels = tomllib.loads(files("studies.literature").joinpath("chung_ooi.toml").read_text("utf-8"))
+    panels = tomllib.loads(
+        files("studies.literature").joinpath("chung_ooi.toml").read_text("utf-8")
+    )
     for panel in panels.values():
         for series in panel["series"]:
             series["points"] = np.array(series["points"], dtype=np.float64)
@@ -204,22 +247,36 @@ def largest(title: str, away: FloatArray, tolerance: float, at: FloatArray | Non
 def benchmarks() -> Iterator[Line]:
     """The tests beside closed forms and published numbers."""
     for name, test in TESTS.items():
-        yield largest(f"{name}, restitution", test.after.normal / test.before.normal - test.restitution, 5e-3)
+        yield largest(
+            f"{name}, restitution", test.after.normal / test.before.normal - test.restitution, 5e-3
+        )
         if len(test.before.normal) == 1 and test.restitution == 1.0:
             closing, peak = float(test.closing[0]), float(test.course()[1].max())
-            yield Line(f"{name}, largest force (Hertz)", test.impact.peak_force(closing), peak, STEP, "N")
-            yield Line(f"{name}, duration (Hertz)", test.impact.duration(closing), test.duration(), STEP, "s")
+            yield Line(
+                f"{name}, largest force (Hertz)", test.impact.peak_force(closing), peak, STEP, "N"
+            )
+            yield Line(
+                f"{name}, duration (Hertz)",
+                test.impact.duration(closing),
+                test.duration(),
+                STEP,
+                "s",
+            )
             if name in PEAKS:
                 yield Line(f"{name}, largest force (published)", PEAKS[name], peak, STEP, "N")
         if test.like:  # the surfaces do not slide on each other
             for which in ("tangential", "rolling"):
-                change = (getattr(test.after, which) - getattr(test.before, which)) / test.before.normal
+                change = (
+                    getattr(test.after, which) - getattr(test.before, which)
+                ) / test.before.normal
                 yield largest(f"{name}, change of the {which} speed over the normal", change, 1e-6)
     panels = published()
     for key, panel in PANELS.items():
         test, slides = TESTS[panel.test], (panel.slides[0] < panel.x) & (panel.x < panel.slides[1])
         axis = panels[key]["axis"]
-        expected, values = (panel.y(test, speeds)[slides] / axis for speeds in (test.sliding(), test.after))
+        expected, values = (
+            panel.y(test, speeds)[slides] / axis for speeds in (test.sliding(), test.after)
+        )
         title = f"{panel.test[0]}: {key}, gross sliding: largest deviation over the axis"
         yield largest(title, values - expected, SLIDING)
     for key, figure in panels.items():

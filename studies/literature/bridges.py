@@ -36,7 +36,9 @@ class Law(NamedTuple):
     """
 
     pull: Callable[[float, float, float, float, FloatArray], FloatArray]
-    rupture: Callable[[float, float, float, float], float] = lambda *bridge: capillary.rupture_distance(*bridge[2:])
+    rupture: Callable[[float, float, float, float], float] = lambda *bridge: (
+        capillary.rupture_distance(*bridge[2:])
+    )
     error: float = inf
 
 
@@ -55,7 +57,12 @@ def pulls() -> Iterator[Line]:
         large, small = dimer_of(case).radii
         for place, radius in (("beads", small), ("wall", inf)):
             surfaces = surfaces_of(case, large, radius)
-            shape = (surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle)
+            shape = (
+                surfaces.radius,
+                surfaces.other_radius,
+                surfaces.volume,
+                surfaces.liquid.contact_angle,
+            )
             exact = young_laplace.law(surfaces)
             distances = _even(exact.rupture)
             true = exact.forces(distances).pull / surfaces.liquid.surface_tension
@@ -64,15 +71,27 @@ def pulls() -> Iterator[Line]:
                 pull = law.pull(*shape, gaps)
                 work = float(np.trapezoid(pull, gaps) / np.trapezoid(true, distances))
                 title = f"{author}, {name}, {place}"
-                yield Line(f"{title}: pull at contact over Young–Laplace", 1.0, float(pull[0] / true[0]), law.error)
+                yield Line(
+                    f"{title}: pull at contact over Young–Laplace",
+                    1.0,
+                    float(pull[0] / true[0]),
+                    law.error,
+                )
                 yield Line(f"{title}: work over Young–Laplace", 1.0, work)
-                yield Line(f"{title}: rupture distance over Young–Laplace", 1.0, float(gaps[-1] / exact.rupture))
+                yield Line(
+                    f"{title}: rupture distance over Young–Laplace",
+                    1.0,
+                    float(gaps[-1] / exact.rupture),
+                )
 
 
 def velocities(out: Path) -> Iterator[Line]:
     """Velocities of walkers by other laws than Young–Laplace; ``out`` is the folder of their runs."""
     for name in WALKED:
-        exact, *by_laws = (1e3 * run(load_case(name, {"liquid.law": law}), out).result["velocity"] for law in WALKED_BY)
+        exact, *by_laws = (
+            1e3 * run(load_case(name, {"liquid.law": law}), out).result["velocity"]
+            for law in WALKED_BY
+        )
         for law, speed in zip(WALKED_BY[1:], by_laws, strict=True):
             yield Line(f"velocity of {name}: {WALKED_BY[0]}, {law}", exact, speed, unit="mm/s")
 

@@ -36,14 +36,32 @@ from walkers.templates.deck import Plan
 from walkers.templates.placement import Bead, Scene, loading_of, surface_of
 
 FRICTION, G = 0.2, 9.81
-SLOWS = 3.5 * FRICTION * G  # m/s²; friction slows the surface of a solid sphere 7/2 times as much as its centre
-BASE, CYCLES, FIRST = 80.0, 12, 4  # Hz; number of cycles, and number of first cycles that are not measured
+SLOWS = (
+    3.5 * FRICTION * G
+)  # m/s²; friction slows the surface of a solid sphere 7/2 times as much as its centre
+BASE, CYCLES, FIRST = (
+    80.0,
+    12,
+    4,
+)  # Hz; number of cycles, and number of first cycles that are not measured
 PHASES = np.arange(0.0, 180.0, 30.0)  # of the second tone, degrees
-STRENGTHS = np.array([2.0, 4.0, 8.0, 16.0])  # peak acceleration of both tones over the deceleration `SLOWS`
-GLASS, FILM, ROUGH, RESTITUTION = 2.75e-3, 0.45e-3, 1e-7, 0.97  # radius of a bead, film, roughness, m; of a dry bead
+STRENGTHS = np.array(
+    [2.0, 4.0, 8.0, 16.0]
+)  # peak acceleration of both tones over the deceleration `SLOWS`
+GLASS, FILM, ROUGH, RESTITUTION = (
+    2.75e-3,
+    0.45e-3,
+    1e-7,
+    0.97,
+)  # radius of a bead, film, roughness, m; of a dry bead
 OILS = np.array([0.25, 0.5, 1.0, 2.0, 4.0]) * 4.6e-3  # viscosities, Pa s
 SPEEDS = np.array([0.25, 0.5, 1.0, 2.0])  # of impacts, m/s
-_DRY = {**DRY, "environment.gravity": f"{G} m/s^2", "contact.restitution": 0.5, "contact.friction.bead_wall": FRICTION}
+_DRY = {
+    **DRY,
+    "environment.gravity": f"{G} m/s^2",
+    "contact.restitution": 0.5,
+    "contact.friction.bead_wall": FRICTION,
+}
 
 
 @contextmanager
@@ -80,7 +98,12 @@ def symmetry(out: Path) -> Iterator[Line]:
 
 
 def followed(
-    bench: Bench, cases: Sequence[Case], beads: Sequence[Bead], steps: int, every: int, walls: Sequence[Wall] = (FLOOR,)
+    bench: Bench,
+    cases: Sequence[Case],
+    beads: Sequence[Bead],
+    steps: int,
+    every: int,
+    walls: Sequence[Wall] = (FLOOR,),
 ) -> FloatArray:
     """Frames of beads, each with its own case, 8 mm apart along y; shape (steps // every + 1, beads, 9)."""
     kinds = list(dict.fromkeys(map(surface_of, cases)))
@@ -100,8 +123,19 @@ def thrown(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
     frames = followed(bench, [case], [bead], 10 * round(0.15 * ends / case.run.time_step), 10)[:, 0]
     slip, time = frames[:, 3] - R * frames[:, 7], 10.0 * case.run.time_step * np.arange(len(frames))
     slope, start = np.polyfit(time[slip > 0.05 * speed], slip[slip > 0.05 * speed], 1)
-    yield Line("thrown bead: speed of rolling over speed of the throw", 5.0 / 7.0, frames[-1, 3] / speed, 1e-3)
-    yield Line("thrown bead: time until it rolls", 2.0 * speed / (7.0 * FRICTION * G), -start / slope, 1e-3, "s")
+    yield Line(
+        "thrown bead: speed of rolling over speed of the throw",
+        5.0 / 7.0,
+        frames[-1, 3] / speed,
+        1e-3,
+    )
+    yield Line(
+        "thrown bead: time until it rolls",
+        2.0 * speed / (7.0 * FRICTION * G),
+        -start / slope,
+        1e-3,
+        "s",
+    )
 
 
 def glide(phase: float, angle: FloatArray | float) -> FloatArray:
@@ -135,27 +169,49 @@ def slider(bench: Bench, phase: float) -> FloatArray:
     """
     plain, start, drift = bench_case(_DRY), float(glide(phase, 0.0)), weak(phase)
     speeds = SLOWS * STRENGTHS / (2.0 * pi * BASE)
-    gap, steps, cases = -contact_loads(plain)[0].overlap, round(1.0 / BASE / plain.run.time_step), []
+    gap, steps, cases = (
+        -contact_loads(plain)[0].overlap,
+        round(1.0 / BASE / plain.run.time_step),
+        [],
+    )
     for peak in SLOWS * STRENGTHS:
         tones = (BASE, 0.0), (2.0 * BASE, radians(phase))
-        sines = (Harmonic(axis="x", frequency=tone, peak_acceleration=peak, phase=angle) for tone, angle in tones)
+        sines = (
+            Harmonic(axis="x", frequency=tone, peak_acceleration=peak, phase=angle)
+            for tone, angle in tones
+        )
         cases.append(plain.put("drive.harmonics", tuple(sines)))
-    moves, turns = start + 2.0 / 7.0 * drift, -5.0 / 7.0 * drift / R  # so that the centre stays here
-    beads = [over(FLOOR, gap, R, (moves * speed, 0.0, 0.0), (0.0, turns * speed, 0.0)) for speed in speeds.tolist()]
+    moves, turns = (
+        start + 2.0 / 7.0 * drift,
+        -5.0 / 7.0 * drift / R,
+    )  # so that the centre stays here
+    beads = [
+        over(FLOOR, gap, R, (moves * speed, 0.0, 0.0), (0.0, turns * speed, 0.0))
+        for speed in speeds.tolist()
+    ]
     frames = followed(bench, cases, beads, CYCLES * steps, 50)[1 + FIRST * steps // 50 :]
     return np.asarray((frames[..., 3] - R * frames[..., 7]).mean(axis=0) / speeds)
 
 
 def two_tones(bench: Bench) -> Iterator[Line]:
     """Drift of a dry bead by two tones, beside the friction model and limits."""
-    drifts, expected = (np.array([drift(phase) for phase in PHASES]) for drift in (partial(slider, bench), modelled))
+    drifts, expected = (
+        np.array([drift(phase) for phase in PHASES]) for drift in (partial(slider, bench), modelled)
+    )
     title = "dry bead, two tones"
     away = float(np.abs(drifts - expected).max())
-    yield Line(f"{title}, {drifts.size} drives: largest distance of the drift from the friction model", 0.0, away, 5e-3)
+    yield Line(
+        f"{title}, {drifts.size} drives: largest distance of the drift from the friction model",
+        0.0,
+        away,
+        5e-3,
+    )
     yield Line(f"{title} in phase, weak friction: drift", weak(0.0), drifts[0, -1], 0.03)
     for phase, growth in ((0, 2.0), (90, 1.0)):
         last = drifts[list(PHASES).index(phase), -2:] * STRENGTHS[-2:]
-        yield Line(f"{title}, {phase}°: growth of the drift at twice the drive", growth, last[1] / last[0])
+        yield Line(
+            f"{title}, {phase}°: growth of the drift at twice the drive", growth, last[1] / last[0]
+        )
 
 
 def filmed(surfaces: Surfaces) -> Curve:
@@ -167,23 +223,37 @@ def _wet(radius: float, film: float, changes: Mapping[str, Any]) -> Case:
     """A glass bead and a film, m. A bridge has the liquid that the bead displaces: it is as high as the film."""
     share = 2.0 * pi * radius * film**2 / bead_volume(radius)
     liquid = {"liquid.volume_fraction": share, "contact.roughness.bead_wall": f"{ROUGH} m"}
-    bead = {"beads.density": "2.5 g/cm^3", "dimers.radii": [f"{radius} m"] * 2, "contact.restitution": RESTITUTION}
+    bead = {
+        "beads.density": "2.5 g/cm^3",
+        "dimers.radii": [f"{radius} m"] * 2,
+        "contact.restitution": RESTITUTION,
+    }
     return bench_case({**bead, **liquid, **changes})
 
 
-def restitutions(bench: Bench, modulus: float = 7e10, law: str = "young-laplace") -> tuple[FloatArray, FloatArray]:
+def restitutions(
+    bench: Bench, modulus: float = 7e10, law: str = "young-laplace"
+) -> tuple[FloatArray, FloatArray]:
     """Stokes numbers ρDv/9η and restitutions of glass beads of a modulus (Pa) on a wet plate, (`OILS`, `SPEEDS`)."""
     impact = Impact(2500.0 * bead_volume(GLASS), GLASS, reduced_modulus(modulus, 0.3))
     step = {"run.time_step": f"{impact.duration(SPEEDS.max()) / 100.0} s"}
-    plain = _wet(GLASS, FILM, {**step, "liquid.law": law, "contact.youngs_modulus": f"{modulus} Pa"})
+    plain = _wet(
+        GLASS, FILM, {**step, "liquid.law": law, "contact.youngs_modulus": f"{modulus} Pa"}
+    )
     cases = [plain.put("liquid.dynamic_viscosity", oil) for oil in OILS.tolist() for _ in SPEEDS]
     high, far = 1.001 * FILM, 1.01 * bridge_at_rest(plain, GLASS, inf).rupture
-    beads = [over(FLOOR, high, GLASS, (0.0, 0.0, -speed), STILL) for _ in OILS for speed in SPEEDS.tolist()]
+    beads = [
+        over(FLOOR, high, GLASS, (0.0, 0.0, -speed), STILL)
+        for _ in OILS
+        for speed in SPEEDS.tolist()
+    ]
     lasts = (high + 5.0 * far) / SPEEDS.min() + 2.0 * impact.duration(SPEEDS.min())
     every = round(lasts / plain.run.time_step / 200)
     frames = followed(bench, cases, beads, 200 * every, every)
     has_left = (frames[..., 2] > GLASS + far) & (frames[..., 5] > 0.0)
-    after = np.where(has_left.any(axis=0), frames[has_left.argmax(axis=0), range(len(beads)), 5], 0.0)
+    after = np.where(
+        has_left.any(axis=0), frames[has_left.argmax(axis=0), range(len(beads)), 5], 0.0
+    )
     stokes = 2500.0 * 2.0 * GLASS * SPEEDS / (9.0 * OILS[:, None])
     return stokes, after.reshape(stokes.shape) / SPEEDS
 
@@ -195,9 +265,18 @@ def impacts(bench: Bench) -> Iterator[Line]:
     drag, e = 1.0 / stokes[:, 2], hard[:, 2]
     slope, start = np.polyfit(drag, e, 1)
     title = "glass bead on a wet plate"
-    yield Line(f"{title}: largest distance of e from a line in 1/St", 0.0, np.abs(start + slope * drag - e).max(), 0.02)
+    yield Line(
+        f"{title}: largest distance of e from a line in 1/St",
+        0.0,
+        np.abs(start + slope * drag - e).max(),
+        0.02,
+    )
     yield Line(f"{title}: e at 1/St = 0, dry bead", RESTITUTION, start, 0.02)
-    yield Line(f"{title}: critical Stokes number, ln(film/roughness) of approach", log(FILM / ROUGH), -slope / start)
+    yield Line(
+        f"{title}: critical Stokes number, ln(film/roughness) of approach",
+        log(FILM / ROUGH),
+        -slope / start,
+    )
     title += f", St = {stokes[2, 2]:.0f}: e"
     yield Line(f"{title} at 1 m/s and at 2 m/s", e[2], hard[3, 3])
     yield Line(f"{title}, bridge from the surface of the film", e[2], filled[2, 2])
@@ -206,18 +285,30 @@ def impacts(bench: Bench) -> Iterator[Line]:
 
 def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterator[Line]:
     """A bead on and below a plate of 20° with a viscous film, with and without friction, and which beads hang."""
-    weight = {"boundary.tilt": "20 deg", "environment.gravity": f"{G} m/s^2", "run.time_step": "0.2 us"}
+    weight = {
+        "boundary.tilt": "20 deg",
+        "environment.gravity": f"{G} m/s^2",
+        "run.time_step": "0.2 us",
+    }
     plain = _wet(radius, film, weight)
     oily, thin = (plain.put("liquid.dynamic_viscosity", viscosity) for viscosity in (0.1, 4.6e-3))
     ceiling, load = Flat((0.0, 0.0, 0.02), (0.0, 0.0, -1.0), "ceiling"), contact_loads(plain)[0]
     held = load.pull / (bead_volume(radius) * plain.pressing_gravity)
-    beads = [over(wall, -load.overlap, radius, spin=STILL) for wall in (FLOOR, FLOOR, ceiling, ceiling, ceiling)]
-    beads[3:] = [replace(bead, density=share * held) for bead, share in zip(beads[3:], (0.9, 1.1), strict=True)]
+    beads = [
+        over(wall, -load.overlap, radius, spin=STILL)
+        for wall in (FLOOR, FLOOR, ceiling, ceiling, ceiling)
+    ]
+    beads[3:] = [
+        replace(bead, density=share * held)
+        for bead, share in zip(beads[3:], (0.9, 1.1), strict=True)
+    ]
     cases = oily, oily.put("contact.friction.bead_wall", FRICTION), oily, thin, thin
     last = followed(bench, cases, beads, 300_000, 3000, (FLOOR, ceiling))[-1]
     rolls, gaps = np.abs(radius * last[:, 7] / last[:, 3]), 0.02 - radius - last[:, 2]
     sliding, coupling, rolling = resistances_at_rest(oily, radius, inf)
-    free = (radius * sliding + coupling) / (radius * sliding + 2.0 * coupling + rolling / radius)  # no torque
+    free = (radius * sliding + coupling) / (
+        radius * sliding + 2.0 * coupling + rolling / radius
+    )  # no torque
     yield Line("bead on a wet incline, no friction: Rω/v", free, rolls[0], 1e-2)
     yield Line("bead on a wet incline, friction 0.2: Rω/v", 1.0, rolls[1], 1e-2)
     yield Line("bead below a wet incline, no friction: Rω/v", free, rolls[2], 1e-2)

@@ -37,22 +37,37 @@ def compare(sources: Sources) -> dict[str, Any]:
     beside the one-parameter curve of Figs. 2 and 3, which is no measurement, mm/s.
     """
     experiments = list(ruby().experiments)
-    cases = {name: dict(zip(experiments, sweep_of(of_facts(name)).cases(), strict=True)) for name in sets()}
+    cases = {
+        name: dict(zip(experiments, sweep_of(of_facts(name)).cases(), strict=True))
+        for name in sets()
+    }
     tables = {name: sources.table(of_facts(name)) for name in sets()}
-    numbers = {name: dict(zip(experiments, numbers_in(table), strict=True)) for name, table in tables.items()}
+    numbers = {
+        name: dict(zip(experiments, numbers_in(table), strict=True))
+        for name, table in tables.items()
+    }
     theory = _by_theory(cases["shipped"])
     facts = [_fact(observation, numbers, theory) for observation in ruby().file.observations]
     counted = [fact["agree"] for fact in facts if not fact["derived"]]
     thresholds: Any = thresholds_with_theory(sources).to_dict("records")
     return {
         "sets": {
-            name: {"agree": sum(agrees[name] for agrees in counted), "of": len(counted), "parameters": _parameters(of)}
+            name: {
+                "agree": sum(agrees[name] for agrees in counted),
+                "of": len(counted),
+                "parameters": _parameters(of),
+            }
             for name, of in cases.items()
         },
         "facts": facts,
         "thresholds": [plain(row) for row in thresholds],
         "curve": [
-            *_curve(sources, "fig2", "peak_acceleration", lambda peak: f"{peak / ACCELERATION_OF_ONE_G:.3g} g"),
+            *_curve(
+                sources,
+                "fig2",
+                "peak_acceleration",
+                lambda peak: f"{peak / ACCELERATION_OF_ONE_G:.3g} g",
+            ),
             *_curve(sources, "fig3", "sin_delta", lambda sine: f"sin δ = {sine:.3f}"),
         ],
     }
@@ -64,7 +79,9 @@ def _parameters(cases: Mapping[str, Case]) -> dict[str, str]:
     for name, parameter in ruby().file.parameters.items():
         case = cases[parameter.experiments[0] if parameter.experiments else next(iter(cases))]
         texts = {origin.key: origin.text for origin in case.origins}
-        shown[parameter.symbol or name] = " and ".join(dict.fromkeys(texts[key] for key in parameter.keys))
+        shown[parameter.symbol or name] = " and ".join(
+            dict.fromkeys(texts[key] for key in parameter.keys)
+        )
     return shown
 
 
@@ -72,16 +89,26 @@ def _by_theory(cases: Mapping[str, Case]) -> Numbers:
     """Speeds by Coulomb friction and drag; NaN for other quantities, and where contacts open."""
     numbers: dict[str, dict[str, float]] = {label: defaultdict(lambda: nan) for label in cases}
     for quantity in {observation.quantity for observation in ruby().file.observations}:
-        values = predicted_column(list(cases.values()), quantity)[0].get(MODEL, np.full(len(cases), nan))
+        values = predicted_column(list(cases.values()), quantity)[0].get(
+            MODEL, np.full(len(cases), nan)
+        )
         for label, value in zip(cases, values, strict=True):
             numbers[label][quantity] = float(value)
     return numbers
 
 
-def _fact(observation: Observation, numbers: Mapping[str, Numbers], theory: Numbers) -> dict[str, Any]:
-    values, scale = {name: observation.of_numbers(of_set) for name, of_set in numbers.items()}, observation.unit[1]
+def _fact(
+    observation: Observation, numbers: Mapping[str, Numbers], theory: Numbers
+) -> dict[str, Any]:
+    values, scale = (
+        {name: observation.of_numbers(of_set) for name, of_set in numbers.items()},
+        observation.unit[1],
+    )
     return {
-        **{name: getattr(observation, name) for name in ("name", "title", "says", "source", "derived")},
+        **{
+            name: getattr(observation, name)
+            for name in ("name", "title", "says", "source", "derived")
+        },
         "expected": observation.text,
         "values": plain({name: value * scale for name, value in values.items()}),
         "texts": {name: _text_of(value, observation) for name, value in values.items()},
@@ -111,15 +138,25 @@ def _text_of(value: float, observation: Observation) -> str | None:
     return f"{shown:.{_MOST_DIGITS}g}"
 
 
-def _curve(sources: Sources, sweep: str, column: str, label: Callable[[float], str]) -> list[dict[str, Any]]:
+def _curve(
+    sources: Sources, sweep: str, column: str, label: Callable[[float], str]
+) -> list[dict[str, Any]]:
     """Rows of a sweep: label, and means over the frequencies by engine, theory and the paper's curve, mm/s.
 
     ``by_frequency`` is the engine's velocity at the highest frequency over that at the lowest.
     """
     table = sources.table(sweep)
     table = table[table["status"] == "finished"].sort_values("frequency")
-    models = predicted_column([case_of(Path(run)) for run in table["run"]], "velocity")[0] if len(table) else {}
-    models_of_curve = {"engine": table["velocity"], "theory": models.get(MODEL, nan), "curve": models.get(PAPER, nan)}
+    models = (
+        predicted_column([case_of(Path(run)) for run in table["run"]], "velocity")[0]
+        if len(table)
+        else {}
+    )
+    models_of_curve = {
+        "engine": table["velocity"],
+        "theory": models.get(MODEL, nan),
+        "curve": models.get(PAPER, nan),
+    }
     numbers = table[[column]].astype(float).round(_PLACES).assign(**models_of_curve)
     rows = []
     for _, group in numbers.groupby(column):

@@ -10,7 +10,14 @@ import numpy as np
 from studies.paper.sources import Sources, described, ruby, thresholds_with_theory
 from walkers.arrays import FloatArray
 from walkers.postprocess.measure.gait import gait
-from walkers.postprocess.show.drawing import ONE_COLUMN, TWO_COLUMNS, legend_below, letter_panels, new_figure, styled
+from walkers.postprocess.show.drawing import (
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    legend_below,
+    letter_panels,
+    new_figure,
+    styled,
+)
 from walkers.postprocess.show.necks import bridges_at
 from walkers.postprocess.show.scene import Scene, Window, axes_toward
 from walkers.sweeps.figure import figure_of
@@ -50,7 +57,9 @@ def fig1b(sources: Sources) -> Figure:
     cycles = round(_INTERVAL * case.excitation.frequency)
     frames = np.arange(_IMAGES) * cycles * case.run.samples_per_cycle
     frames = frames[frames < len(trajectory.time)]
-    centre = trajectory.mass_centre[frames, 0] @ np.stack([trajectory.drive_axis, trajectory.across_axis], axis=-1)
+    centre = trajectory.mass_centre[frames, 0] @ np.stack(
+        [trajectory.drive_axis, trajectory.across_axis], axis=-1
+    )
     along = (float(centre[:, 0].min()) - 2.4 * largest, float(centre[:, 0].max()) + 2.4 * largest)
     half, origin = 1.15 * largest, float(centre[0, 0])
     row = 0.97 * ONE_COLUMN * 2.0 * half / (along[1] - along[0]) + 0.22
@@ -95,11 +104,22 @@ def fig3(sources: Sources) -> Figure:
 def fig2_threshold(sources: Sources) -> Figure:
     """Γc between the last drive with motion and the first one without, and by the protocol of the paper, a ramp."""
     sources.finished("fig2-threshold")
-    frequencies, low, high, theory, ramp, within = thresholds_with_theory(sources).to_numpy(dtype=float).T
+    frequencies, low, high, theory, ramp, within = (
+        thresholds_with_theory(sources).to_numpy(dtype=float).T
+    )
     figure, axes = new_figure(ONE_COLUMN, 2.8)
     label = "engine: runs from rest, rest below, motion above"
-    axes.errorbar(frequencies, (low + high) / 2.0, (high - low) / 2.0, fmt="o", mfc="none", label=label)
-    axes.errorbar(frequencies + 1.0, ramp, within, fmt="s", mfc="none", label="engine: one run, the drive falls")
+    axes.errorbar(
+        frequencies, (low + high) / 2.0, (high - low) / 2.0, fmt="o", mfc="none", label=label
+    )
+    axes.errorbar(
+        frequencies + 1.0,
+        ramp,
+        within,
+        fmt="s",
+        mfc="none",
+        label="engine: one run, the drive falls",
+    )
     axes.plot(frequencies, theory, "--", color="0.2", lw=0.9, label=MODEL)
     axes.set(xlabel="frequency (Hz)", ylabel=r"threshold of motion $\Gamma_\mathrm{c}$")
     axes.set(xticks=frequencies, ylim=(0.0, 1.3 * float(np.nanmax([*high, *theory]))))
@@ -132,16 +152,32 @@ def _draw_cycles(axes: Axes, trajectory: Group, row: pd.Series[float], letter: s
     last = slice((run.cycles - _CYCLES) * samples, run.cycles * samples + 1)
     values = [motion.velocity[last, 0], motion.rotation[last, 0, 0], motion.rotation[last, 0, 1]]
     theory = theory_of_cycles(trajectory)
-    for (name, column, marker, colour, size), series, line in zip(_SERIES, values, theory, strict=True):
+    for (name, column, marker, colour, size), series, line in zip(
+        _SERIES, values, theory, strict=True
+    ):
         label = f"{name}: {row[column] * 1e3:.2f}"
         if expected := measured.get(f"fig4{letter}_{column.removesuffix('_1')}"):
             axes.axhline(expected * 1e3, color=colour, ls=_MEASURED_DASHES, lw=1.0)
             label += f", measured {expected * 1e3:.1f}"
-        look: dict[str, Any] = {"color": colour, "ms": size, "mfc": "none", "mew": 0.8, "label": label}
+        look: dict[str, Any] = {
+            "color": colour,
+            "ms": size,
+            "mfc": "none",
+            "mew": 0.8,
+            "label": label,
+        }
         axes.plot(np.arange(len(series)) / samples, series * 1e3, marker, **look)
-        axes.plot(np.arange(len(line)) / (len(line) - 1) * _CYCLES, line * 1e3, color=colour, lw=0.36 * size)
+        axes.plot(
+            np.arange(len(line)) / (len(line) - 1) * _CYCLES,
+            line * 1e3,
+            color=colour,
+            lw=0.36 * size,
+        )
     axes.axhline(0.0, color="0.4", lw=0.6)
-    axes.set(xlabel="time (cycles of the drive)", ylabel=r"velocity; beads: $-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)")
+    axes.set(
+        xlabel="time (cycles of the drive)",
+        ylabel=r"velocity; beads: $-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)",
+    )
 
 
 def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
@@ -150,7 +186,11 @@ def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
     Starts with a cycle of the engine's drive; NaN where a contact would open.
     """
     motion = motion_of(trajectory.case)
-    sliding = motion.series[:, 0] if np.isfinite(motion.velocity[0]) else np.full_like(motion.series[:, 0], np.nan)
+    sliding = (
+        motion.series[:, 0]
+        if np.isfinite(motion.velocity[0])
+        else np.full_like(motion.series[:, 0], np.nan)
+    )
     velocity = translation(sliding)
     # Along x, the substrate accelerates as cos 2πft in the theory, and as -sin 2πft in the engine.
     quarter = sliding.shape[1] // 4

@@ -33,7 +33,9 @@ class Drawing(NamedTuple):
     title: str
 
 
-_FIG2 = partial(of_sweep, name="fig2", x="drive.peak_acceleration", hue="drive.frequency", theory=True)
+_FIG2 = partial(
+    of_sweep, name="fig2", x="drive.peak_acceleration", hue="drive.frequency", theory=True
+)
 FIGURES = {
     "fig1b": Drawing(fig1b, ("alignment",), "Fig. 1b: strobed top views of a walker"),
     "fig2": Drawing(_FIG2, ("fig2",), "Fig. 2: velocity against peak acceleration"),

@@ -24,7 +24,12 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _FRICTION_ONLY = {
-    **{"friction_wall": 0.311, "friction_slide": 0.311, "friction_bead": 0.083, "rolling_friction": 0.0035},
+    **{
+        "friction_wall": 0.311,
+        "friction_slide": 0.311,
+        "friction_bead": 0.083,
+        "rolling_friction": 0.0035,
+    },
     **{"roughness": 2000.0, "meniscus_radius": 40.0},
 }
 """Rough surfaces, so that bridges drag little: outside of the calibration's ranges, in the units of its file."""
@@ -51,7 +56,11 @@ def sweep_of(name: str) -> Sweep:
     """A shipped sweep, or one of `of_facts`."""
     for label, values in sets().items():
         if name == of_facts(label):
-            row = None if values is None else np.array([[values[parameter] for parameter in ruby().file.parameters]])
+            row = (
+                None
+                if values is None
+                else np.array([[values[parameter] for parameter in ruby().file.parameters]])
+            )
             return ruby().sweep(name, row)
     return load_sweep(name)
 
@@ -71,8 +80,12 @@ class Sources:
 
     def __init__(self, out: Path) -> None:
         self.out = out
-        self.table: Callable[[str], pd.DataFrame] = lru_cache(maxsize=None)(lambda sweep: load(out / sweep))
-        self.trajectory: Callable[[str], Group] = lru_cache(maxsize=32)(lambda run: read_motion(run).groups[0])
+        self.table: Callable[[str], pd.DataFrame] = lru_cache(maxsize=None)(
+            lambda sweep: load(out / sweep)
+        )
+        self.trajectory: Callable[[str], Group] = lru_cache(maxsize=32)(
+            lambda run: read_motion(run).groups[0]
+        )
 
     def finished(self, sweep: str) -> pd.DataFrame:
         """The finished points of a sweep; raises `NothingFinishedError` if there is none."""
@@ -100,6 +113,12 @@ def thresholds_with_theory(sources: Sources) -> pd.DataFrame:
     """
     ends = thresholds(sources.table("fig2-threshold"))
     shown = ends[["drive.frequency", "gamma0_at_rest", "gamma0_moving"]]
-    ramp = sources.table("fig2-ramp").groupby("drive.frequency")[["gamma0_stops_at", "gamma0_stops_within"]].first()
+    ramp = (
+        sources.table("fig2-ramp")
+        .groupby("drive.frequency")[["gamma0_stops_at", "gamma0_stops_within"]]
+        .first()
+    )
     ramps = ramp.reindex(shown["drive.frequency"]).to_numpy(dtype=float).T
-    return shown.assign(theory=[*map(_by_theory, ends["drive.frequency"])], ramp=ramps[0], within=ramps[1])
+    return shown.assign(
+        theory=[*map(_by_theory, ends["drive.frequency"])], ramp=ramps[0], within=ramps[1]
+    )

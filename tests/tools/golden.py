@@ -36,18 +36,29 @@ OUT = ROOT / "runs" / "golden"
 POINTS = 25
 """Largest number of points of a sweep whose decks are rendered."""
 RUNS: dict[str, tuple[str, dict[str, Any]]] = {
-    **{name: (name, {}) for name in ("fig1b", "fig4a", "fig4b", "symmetric", "climber", "climber-dimer", "cluster")},
+    **{
+        name: (name, {})
+        for name in ("fig1b", "fig4a", "fig4b", "symmetric", "climber", "climber-dimer", "cluster")
+    },
     "tray": ("tray", {}),
     "pile-ci": ("pile-ci", {}),
     "slope": ("fig1b", {"boundary.tilt": "20 deg", "run.cycles": 24, "run.settling_cycles": 8}),
-    "groove": ("fig1b", {"boundary.shape": "groove", "boundary.opening": "120 deg", "dimers.replicates": 2}),
-    "two-tones": ("fig4a", {"drive.waveform": "triangle", "run.cycles": 24, "run.settling_cycles": 8}),
+    "groove": (
+        "fig1b",
+        {"boundary.shape": "groove", "boundary.opening": "120 deg", "dimers.replicates": 2},
+    ),
+    "two-tones": (
+        "fig4a",
+        {"drive.waveform": "triangle", "run.cycles": 24, "run.settling_cycles": 8},
+    ),
 }
 
 
 def digest(content: str | bytes) -> str:
     """A short digest of a text or of bytes."""
-    return hashlib.sha256(content if isinstance(content, bytes) else content.encode()).hexdigest()[:16]
+    return hashlib.sha256(content if isinstance(content, bytes) else content.encode()).hexdigest()[
+        :16
+    ]
 
 
 def _cases(sweep: str) -> Iterator[tuple[str, Case, bool]]:
@@ -72,7 +83,10 @@ def of_points(name: str) -> dict[str, list[str]]:
     """Digests of the points of a shipped case or sweep."""
     points = [(name, load_case(name), True)] if name in shipped("case") else _cases(name)
     return {
-        key: [digest(json.dumps(case.determinants(), sort_keys=True)), *(_of_deck(case) if rendered else [])]
+        key: [
+            digest(json.dumps(case.determinants(), sort_keys=True)),
+            *(_of_deck(case) if rendered else []),
+        ]
         for key, case, rendered in points
     }
 
@@ -91,7 +105,9 @@ def runs() -> dict[str, Any]:
         place = run(load_case(case, changes), OUT).directory
         for path in sorted(place.glob("*.parquet")):
             table = pd.read_parquet(path)
-            digests |= {f"{name}/{path.stem}/{column}": _of_column(table[column]) for column in table}
+            digests |= {
+                f"{name}/{path.stem}/{column}": _of_column(table[column]) for column in table
+            }
         result = json.loads((place / "result.json").read_text("utf-8"))
         digests |= {f"{name}/result/{key}": value for key, value in result["numbers"].items()}
     return digests
@@ -99,7 +115,9 @@ def runs() -> dict[str, Any]:
 
 def _of_column(column: pd.Series) -> str:
     values = column.to_numpy()
-    return digest("\n".join(map(repr, values.tolist())) if values.dtype == object else values.tobytes())
+    return digest(
+        "\n".join(map(repr, values.tolist())) if values.dtype == object else values.tobytes()
+    )
 
 
 PARTS = {"decks": decks, "runs": runs}
@@ -109,7 +127,11 @@ def differences(golden: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """What differs, a line each."""
     gone = [f"gone: {key}" for key in golden if key not in now]
     new = [f"new: {key}" for key in now if key not in golden]
-    changed = [f"{key}: {golden[key]} -> {now[key]}" for key in golden if key in now and golden[key] != now[key]]
+    changed = [
+        f"{key}: {golden[key]} -> {now[key]}"
+        for key in golden
+        if key in now and golden[key] != now[key]
+    ]
     return gone + new + changed
 
 
@@ -128,7 +150,11 @@ def main(action: str, *names: str) -> int:
             print(f"{name}: {len(now)} values frozen")
         elif different := differences(golden[name], now):
             status = 1
-            print(f"{name}: {len(different)} of {len(golden[name])} values differ", *different, sep="\n  ")
+            print(
+                f"{name}: {len(different)} of {len(golden[name])} values differ",
+                *different,
+                sep="\n  ",
+            )
         else:
             print(f"{name}: all {len(now)} values are the same")
     return status

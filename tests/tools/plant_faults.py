@@ -46,10 +46,27 @@ def planted(fault: Mapping[str, Any]) -> Iterator[None]:
 
 def failing(arguments: list[str]) -> str | None:
     """The first test that fails, None if all pass."""
-    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:randomly", "-p", "no:cacheprovider", *arguments]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-x",
+        "-p",
+        "no:randomly",
+        "-p",
+        "no:cacheprovider",
+        *arguments,
+    ]
     # Of a set of parameters, processes have another order each. Bytecode of a fault could outlive it.
     environment = {**os.environ, "PYTHONHASHSEED": "0", "PYTHONDONTWRITEBYTECODE": "1"}
-    how = {"cwd": ROOT, "env": environment, "stdout": subprocess.PIPE, "text": True, "start_new_session": True}
+    how = {
+        "cwd": ROOT,
+        "env": environment,
+        "stdout": subprocess.PIPE,
+        "text": True,
+        "start_new_session": True,
+    }
     tests = subprocess.Popen(command, **how)
     try:
         output, _ = tests.communicate(timeout=SECONDS)
@@ -57,10 +74,14 @@ def failing(arguments: list[str]) -> str | None:
         return f"time limit of {SECONDS} s"
     finally:
         if tests.poll() is None:
-            os.killpg(tests.pid, signal.SIGKILL)  # engines and other children end with their parents
+            os.killpg(
+                tests.pid, signal.SIGKILL
+            )  # engines and other children end with their parents
     found = re.search(r"^(?:FAILED|ERROR) (\S+)", output, re.MULTILINE)
     if tests.returncode and not found:
-        raise SystemExit(f"pytest {shlex.join(arguments)}: status {tests.returncode}\n{output[-2000:]}")
+        raise SystemExit(
+            f"pytest {shlex.join(arguments)}: status {tests.returncode}\n{output[-2000:]}"
+        )
     return found[1] if found else None
 
 
@@ -77,7 +98,9 @@ def problems_of(faults: Sequence[Mapping[str, Any]]) -> list[str]:
         for entry in fault["tests"]:
             problems += [f"{name}: {problem}" for problem in _problems_of_tests(entry)]
     names = Counter(fault["name"] for fault in faults)
-    problems += [f"{name}: the name of {number} faults" for name, number in names.items() if number > 1]
+    problems += [
+        f"{name}: the name of {number} faults" for name, number in names.items() if number > 1
+    ]
     return problems
 
 
@@ -95,7 +118,10 @@ def _problems_of_tests(entry: str) -> list[str]:
 
 def main(table: str, word: str = "") -> None:
     """Check the faults; unless ``table`` is ``check``, plant those that are asked for and write the table."""
-    for number in (signal.SIGTERM, signal.SIGINT):  # which a shell has those ignore that it starts with "&"
+    for number in (
+        signal.SIGTERM,
+        signal.SIGINT,
+    ):  # which a shell has those ignore that it starts with "&"
         signal.signal(number, signal.default_int_handler)
     known = tomllib.loads(Path(__file__).with_name("faults.toml").read_text("utf-8"))["fault"]
     chosen = [fault for fault in known if word in fault["name"] + fault["file"]]
@@ -108,17 +134,25 @@ def main(table: str, word: str = "") -> None:
     for fault in chosen:
         began = time.monotonic()
         with planted(fault):
-            first = next((test for entry in fault["tests"] if (test := failing(shlex.split(entry)))), None)
+            first = next(
+                (test for entry in fault["tests"] if (test := failing(shlex.split(entry)))), None
+            )
         seconds = time.monotonic() - began
         caught = "yes" if first else "**no**"
-        rows.append(f"| {fault['name']} | `{fault['file']}` | {caught} | {first or '-'} | {seconds:.0f} |")
+        rows.append(
+            f"| {fault['name']} | `{fault['file']}` | {caught} | {first or '-'} | {seconds:.0f} |"
+        )
         Path(table).write_text("\n".join(rows) + "\n", "utf-8")
         print(rows[-1], flush=True)
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("table", help="the table to write, or check")
-    parser.add_argument("word", nargs="?", default="", help="part of the names or files of the faults to plant")
+    parser.add_argument(
+        "word", nargs="?", default="", help="part of the names or files of the faults to plant"
+    )
     given = parser.parse_args()
     main(given.table, given.word)

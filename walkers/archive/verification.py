@@ -71,8 +71,12 @@ def verify(path: Path) -> list[Verification]:
             for number, (run, state) in enumerate(zip(record.runs, points, strict=True))
             if state.status != "finished"
         ]
-        runs = [state.directory for state in points if state.directory and state.status == "finished"]
-        whole = Verification(record.sweep.name, f"{len(runs)} points have a run", {"missing": missing})
+        runs = [
+            state.directory for state in points if state.directory and state.status == "finished"
+        ]
+        whole = Verification(
+            record.sweep.name, f"{len(runs)} points have a run", {"missing": missing}
+        )
         return [whole, *map(_of_run, dict.fromkeys(runs))]
     if (path / SUMS_NAME).is_file():
         return [_compared(path, _listed(path, (path / SUMS_NAME).read_bytes()))]
@@ -92,7 +96,9 @@ def _of_run(directory: Path) -> Verification:
         return _compared(directory, listed, manifest.get("left_out", ()))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         doubt = f"{MANIFEST_NAME} (it, or a file in its list, cannot be read: {error})"
-        return Verification(directory.resolve().name, "files are not compared", {"doubtful": [doubt]})
+        return Verification(
+            directory.resolve().name, "files are not compared", {"doubtful": [doubt]}
+        )
 
 
 def _listed(path: Path, text: bytes) -> dict[str, str]:
@@ -115,7 +121,9 @@ def _of_zip(path: Path) -> Verification:
             listed = _listed(path, archive.read(SUMS_NAME))
             entries = Counter(archive.namelist())
             changed = [
-                name for name, checksum in listed.items() if name in entries and _checksum_in(archive, name) != checksum
+                name
+                for name, checksum in listed.items()
+                if name in entries and _checksum_in(archive, name) != checksum
             ]
     except _UNREADABLE as error:
         raise refused(path, f"expected an archive, a zip file ({error})") from error
@@ -140,7 +148,9 @@ def _checksum_in(archive: zipfile.ZipFile, name: str) -> str | None:
         return None
 
 
-def _compared(folder: Path, listed: Mapping[str, str], left_out: Collection[str] = ()) -> Verification:
+def _compared(
+    folder: Path, listed: Mapping[str, str], left_out: Collection[str] = ()
+) -> Verification:
     """Compare the files of a folder with their listed checksums, by relative path."""
     files = _files_in(folder)
     readable = [name for name, path in files.items() if name in listed and path.is_file()]
@@ -161,7 +171,9 @@ def _compared(folder: Path, listed: Mapping[str, str], left_out: Collection[str]
         "made since": _with_new_folders(new, listed),
         "left out": [name for name in left_out if name not in sums],
     }
-    return Verification(folder.resolve().name, f"{len(sums) - len(changed)} files are unchanged", findings)
+    return Verification(
+        folder.resolve().name, f"{len(sums) - len(changed)} files are unchanged", findings
+    )
 
 
 def _files_in(folder: Path) -> dict[str, Path]:

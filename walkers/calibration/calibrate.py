@@ -20,7 +20,11 @@ from walkers.runner.failures import BeadsLost, BlowUp
 from walkers.sweeps.scheduler import Failure, Options, run_sweep
 from walkers.sweeps.table import load
 
-PROPOSED = ("highest posterior", "highest posterior without what is held out", "nearest of all sets")
+PROPOSED = (
+    "highest posterior",
+    "highest posterior without what is held out",
+    "nearest of all sets",
+)
 _MISSING = 30.0
 """Distance in deviations that counts for a number that does not exist."""
 FINAL = frozenset(failure.__name__ for failure in (BeadsLost, BlowUp))
@@ -79,16 +83,22 @@ def calibrate(
     file, failures = calibration.file, dict[str, list[Failure]]()
     design, observations = file.design, file.observations
     ends = np.array([parameter.range for parameter in file.parameters.values()]).T
-    list(calibration.sweep(calibration.name, ends).cases())  # refuses ranges that exceed those of their keys
+    list(
+        calibration.sweep(calibration.name, ends).cases()
+    )  # refuses ranges that exceed those of their keys
 
     kept = replace(options, final=FINAL, dumps=False)
 
     def run(part: str, unit: FloatArray, experiments: Sequence[str] = ()) -> FloatArray:
-        sweep = calibration.sweep(f"{calibration.name}-{part}", calibration.values(unit), experiments)
+        sweep = calibration.sweep(
+            f"{calibration.name}-{part}", calibration.values(unit), experiments
+        )
         with progress_of(sweep.name, progress) as advance:
             record, failed = run_sweep(sweep, out, kept, engine=engine, on_progress=advance)
         failures.update({sweep.name: failed} if failed else {})
-        return _numbers(calibration, experiments or [*calibration.experiments], record.directory, failed)
+        return _numbers(
+            calibration, experiments or [*calibration.experiments], record.directory, failed
+        )
 
     named = run("named", calibration.sets) if file.sets else np.zeros((0, len(observations)))
     sobol = unit_cube(len(file.parameters), design.points, design.seed)
@@ -102,7 +112,8 @@ def calibrate(
         if not observation.costly
     }
     posterior, held_out = (
-        Posterior.of([*emulators.values()], design.posterior, design.seed, without) for without in ((), design.held_out)
+        Posterior.of([*emulators.values()], design.posterior, design.seed, without)
+        for without in ((), design.held_out)
     )
     proposed = np.stack([posterior.best, held_out.best, unit[nearest(observations, numbers)]])
     rows, names = np.concatenate([named, run("proposed", proposed)]), (*file.sets, *PROPOSED)
@@ -111,16 +122,26 @@ def calibrate(
     return Outcome(calibration, sets, outcome, len(unit), emulators, posterior, held_out, failures)
 
 
-def _numbers(calibration: Calibration, labels: Sequence[str], sweep: Path, failed: list[Failure]) -> FloatArray:
+def _numbers(
+    calibration: Calibration, labels: Sequence[str], sweep: Path, failed: list[Failure]
+) -> FloatArray:
     """The observations of the sets of a sweep, shape (P, K); NaN for those of runs that failed, or are none of it."""
     table, undone = load(sweep), [failure for failure in failed if failure.reason not in FINAL]
     if undone or not table["status"].isin(("finished", "failed")).all():
         message = undone[0].message if undone else "another process is running them"
-        raise CalibrationStopped(f"{sweep.name}: points are missing ({message}); call again to continue")
+        raise CalibrationStopped(
+            f"{sweep.name}: points are missing ({message}); call again to continue"
+        )
     seen, lacking = numbers_in(table), dict.fromkeys(calibration.experiments, NO_NUMBERS)
-    sets = [lacking | dict(zip(labels, seen[at:], strict=False)) for at in range(0, len(seen), len(labels))]
+    sets = [
+        lacking | dict(zip(labels, seen[at:], strict=False))
+        for at in range(0, len(seen), len(labels))
+    ]
     return np.array(
-        [[observation.of_numbers(numbers) for observation in calibration.file.observations] for numbers in sets]
+        [
+            [observation.of_numbers(numbers) for observation in calibration.file.observations]
+            for numbers in sets
+        ]
     )
 
 
@@ -130,5 +151,7 @@ def nearest(observations: Sequence[Observation], numbers: FloatArray) -> int:
     The logarithm limits the weight of a fact that no set reproduces.
     """
     weighed = [place for place, observation in enumerate(observations) if observation.weighed]
-    away = np.array([[observations[place].residual(row[place]) for place in weighed] for row in numbers])
+    away = np.array(
+        [[observations[place].residual(row[place]) for place in weighed] for row in numbers]
+    )
     return int(np.argmin(np.log1p(np.where(np.isnan(away), _MISSING, away) ** 2).sum(axis=1)))

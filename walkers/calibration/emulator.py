@@ -48,15 +48,22 @@ class Emulator:
     inflation: float  # factor by which the process takes these errors for smaller; at least 1
 
     @classmethod
-    def of(cls, observation: Observation, unit: FloatArray, numbers: FloatArray, seed: int) -> Emulator:
+    def of(
+        cls, observation: Observation, unit: FloatArray, numbers: FloatArray, seed: int
+    ) -> Emulator:
         """Fit sets (P, D) of the unit cube and the numbers of the engine there (P,); NaN where there is none."""
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
         away = distances(observation, numbers)
-        kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(np.ones(unit.shape[1]), (5e-2, 2e1), nu=2.5)
+        kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(
+            np.ones(unit.shape[1]), (5e-2, 2e1), nu=2.5
+        )
         process = GaussianProcessRegressor(
-            kernel + WhiteKernel(1e-2, (1e-6, 1.0)), normalize_y=True, n_restarts_optimizer=2, random_state=seed
+            kernel + WhiteKernel(1e-2, (1e-6, 1.0)),
+            normalize_y=True,
+            n_restarts_optimizer=2,
+            random_state=seed,
         )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # scales at a bound, which have no influence
@@ -70,7 +77,9 @@ class Emulator:
     def predict(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Distance from the fact and its standard error at points (N, D), in deviations."""
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Predicted variances")  # rounding errors of zero, at sets that were run
+            warnings.filterwarnings(
+                "ignore", "Predicted variances"
+            )  # rounding errors of zero, at sets that were run
             mean, deviation = self.process.predict(unit, return_std=True)
         return mean, deviation * self.inflation
 
@@ -81,15 +90,20 @@ class Emulator:
         if self.observation.value is not None:
             return np.asarray(student.logpdf(mean / width, _FREEDOM) - np.log(width))
         low, high = (
-            (limit - middle(self.observation)) / self.observation.deviation for limit in self.observation.limits
+            (limit - middle(self.observation)) / self.observation.deviation
+            for limit in self.observation.limits
         )
-        within = student.cdf((high - mean) / width, _FREEDOM) - student.cdf((low - mean) / width, _FREEDOM)
+        within = student.cdf((high - mean) / width, _FREEDOM) - student.cdf(
+            (low - mean) / width, _FREEDOM
+        )
         return np.asarray(np.log(np.maximum(within, 1e-300)))
 
     def numbers(self, unit: FloatArray, normal: FloatArray) -> FloatArray:
         """Samples of the number at points (N, D), given N standard normal numbers."""
         mean, error = self.predict(unit)
-        return np.asarray(middle(self.observation) + self.observation.deviation * (mean + error * normal))
+        return np.asarray(
+            middle(self.observation) + self.observation.deviation * (mean + error * normal)
+        )
 
 
 @dataclass(frozen=True)
@@ -101,7 +115,9 @@ class Posterior:
     seed: int
 
     @classmethod
-    def of(cls, emulators: Sequence[Emulator], points: int, seed: int, without: Collection[str] = ()) -> Posterior:
+    def of(
+        cls, emulators: Sequence[Emulator], points: int, seed: int, without: Collection[str] = ()
+    ) -> Posterior:
         """Weigh points of the prior by the observations that have a weight and are not of the groups ``without``."""
         used = [
             emulator
@@ -110,7 +126,9 @@ class Posterior:
         ]
         unit = unit_cube(used[0].process.n_features_in_, points, seed)
         parts = [unit[at : at + _AT_ONCE] for at in range(0, points, _AT_ONCE)]
-        total = np.concatenate([np.sum([emulator.log_likelihood(part) for emulator in used], axis=0) for part in parts])
+        total = np.concatenate(
+            [np.sum([emulator.log_likelihood(part) for emulator in used], axis=0) for part in parts]
+        )
         return cls(unit, total - logsumexp(total), seed)
 
     @property

@@ -45,7 +45,9 @@ class Parameter(Table):
 
     @field_validator("range", "normal")
     @classmethod
-    def _check(cls, value: tuple[float, float] | None, validation: ValidationInfo) -> tuple[float, float] | None:
+    def _check(
+        cls, value: tuple[float, float] | None, validation: ValidationInfo
+    ) -> tuple[float, float] | None:
         low, high = value or (1.0, 2.0)
         if validation.field_name == "range" and low >= high:
             raise ValueError("expected a smaller and a larger number")
@@ -123,7 +125,10 @@ class Calibration:
     def sets(self) -> FloatArray:
         """The named sets as points of the unit cube, shape (S, D)."""
         parameters, sets = self.file.parameters, self.file.sets.values()
-        rows = [[parameter.unit_of(given[label]) for label, parameter in parameters.items()] for given in sets]
+        rows = [
+            [parameter.unit_of(given[label]) for label, parameter in parameters.items()]
+            for given in sets
+        ]
         return np.reshape(np.array(rows, np.float64), (-1, len(parameters)))
 
     @property
@@ -132,19 +137,30 @@ class Calibration:
         cheap = [observation for observation in self.file.observations if not observation.costly]
         return set(self.experiments) - {label for fact in cheap for label in (*fact.of, *fact.over)}
 
-    def sweep(self, name: str, values: FloatArray | None = None, experiments: Collection[str] = ()) -> Sweep:
+    def sweep(
+        self, name: str, values: FloatArray | None = None, experiments: Collection[str] = ()
+    ) -> Sweep:
         """The sweep of experiments (default: all), for every parameter set (N, D) or with the case's own values."""
         points = [
             {**self.experiments[label], **self._changes(label, row)}
             for row in ([None] if values is None else values)
             for label in experiments or self.experiments
         ]
-        usual = {key: value for key, value in flatten(self.file.set).items() if key not in points[0]}
+        usual = {
+            key: value for key, value in flatten(self.file.set).items() if key not in points[0]
+        }
         columns = {key: [point[key] for point in points] for key in points[0]}
-        document = {"title": self.file.title, "case": self.file.case, "set": usual, "zip": [columns]}
+        document = {
+            "title": self.file.title,
+            "case": self.file.case,
+            "set": usual,
+            "zip": [columns],
+        }
         sweep = expand(document, source=self.source, name=name, folder=self.folder)
         if "dimers" not in sweep.document:
-            raise InputError(self.source, [Problem("case", f'"{self.file.case}"', "expected a case of dimers")])
+            raise InputError(
+                self.source, [Problem("case", f'"{self.file.case}"', "expected a case of dimers")]
+            )
         return sweep
 
     def case(self, values: FloatArray) -> dict[str, Any]:
@@ -155,7 +171,9 @@ class Calibration:
     def _changes(self, label: str, row: FloatArray | None) -> dict[str, Value]:
         """Values of the keys of parameters in an experiment, for one parameter set (D,)."""
         changes: dict[str, Value] = {}
-        for parameter, value in zip(self.file.parameters.values(), [] if row is None else row, strict=False):
+        for parameter, value in zip(
+            self.file.parameters.values(), [] if row is None else row, strict=False
+        ):
             if label in (parameter.experiments or [label]):
                 changes |= dict.fromkeys(parameter.keys, parameter.written(value))
         return changes
@@ -164,35 +182,60 @@ class Calibration:
 def load_calibration(calibration: str | Path) -> Calibration:
     """Read a calibration file, or a shipped calibration such as ``ruby``; `InputError` if it cannot be used."""
     path = find_input(calibration, "calibration")
-    return read_calibration(read_toml(path), source=str(calibration), name=path.stem, folder=path.parent)
+    return read_calibration(
+        read_toml(path), source=str(calibration), name=path.stem, folder=path.parent
+    )
 
 
-def read_calibration(document: Mapping[str, Any], *, source: str, name: str, folder: Path) -> Calibration:
+def read_calibration(
+    document: Mapping[str, Any], *, source: str, name: str, folder: Path
+) -> Calibration:
     """A calibration given as nested tables; parameters and errors as for `walkers.inputs.sweep.expand`."""
     file = validated(CalibrationFile, document, source, "a calibration")
     changed_by = {label: flatten(table) for label, table in file.experiments.items()}
     varied = dict.fromkeys(key for keys in changed_by.values() for key in keys)
     usual = {key: value for key, value in flatten(file.set).items() if key in varied}
-    if problems := [*_unknown_names(file), *_contradictions(file), *_problems_of_keys(file, {*varied} - {*usual})]:
+    if problems := [
+        *_unknown_names(file),
+        *_contradictions(file),
+        *_problems_of_keys(file, {*varied} - {*usual}),
+    ]:
         raise InputError(source, problems)
-    return Calibration(name, source, folder, file, {label: usual | keys for label, keys in changed_by.items()})
+    return Calibration(
+        name, source, folder, file, {label: usual | keys for label, keys in changed_by.items()}
+    )
 
 
 def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
     """References to names that the file does not define."""
     named: list[tuple[str, Collection[str], Collection[str], str]] = [
-        (f"parameters.{label}.experiments", parameter.experiments or [], file.experiments, "an experiment")
+        (
+            f"parameters.{label}.experiments",
+            parameter.experiments or [],
+            file.experiments,
+            "an experiment",
+        )
         for label, parameter in file.parameters.items()
     ]
     for number, observation in enumerate(file.observations):
         for key, labels in (("of", observation.of), ("over", observation.over)):
-            named.append((f"observations[{number}].{key}", labels, file.experiments, "an experiment"))
-    named += [(f"sets.{label}", given, file.parameters, "a parameter") for label, given in file.sets.items()]
+            named.append(
+                (f"observations[{number}].{key}", labels, file.experiments, "an experiment")
+            )
+    named += [
+        (f"sets.{label}", given, file.parameters, "a parameter")
+        for label, given in file.sets.items()
+    ]
     groups = {observation.group for observation in file.observations}
-    for place, given, names, kind in (*named, ("design.held_out", file.design.held_out, groups, "a group")):
+    for place, given, names, kind in (
+        *named,
+        ("design.held_out", file.design.held_out, groups, "a group"),
+    ):
         for name in given:
             if name not in names:
-                expected = f"expected {kind}: one of {', '.join(sorted(names))}{suggestion(name, names)}"
+                expected = (
+                    f"expected {kind}: one of {', '.join(sorted(names))}{suggestion(name, names)}"
+                )
                 yield Problem(place, f'"{name}"', expected)
 
 
@@ -203,19 +246,30 @@ def _contradictions(file: CalibrationFile) -> Iterator[Problem]:
         if names.index(observation.name) != number:
             yield Problem(f"{place}.name", f'"{observation.name}"', "expected a name of its own")
         if observation.over and set(observation.over) == set(observation.of):
-            yield Problem(f"{place}.over", None, "expected other experiments than in of: the ratio would be 1")
-        if (observation.value is None) == (limits == [None, None]) or observation.limits[0] > observation.limits[1]:
-            yield Problem(place, None, "expected either a value or limits: least, most, or both in this order")
+            yield Problem(
+                f"{place}.over", None, "expected other experiments than in of: the ratio would be 1"
+            )
+        if (observation.value is None) == (limits == [None, None]) or observation.limits[
+            0
+        ] > observation.limits[1]:
+            yield Problem(
+                place, None, "expected either a value or limits: least, most, or both in this order"
+            )
     if not any(
-        observation.weighed and observation.group not in file.design.held_out for observation in file.observations
+        observation.weighed and observation.group not in file.design.held_out
+        for observation in file.observations
     ):
-        yield Problem("observations", None, "expected one that is neither derived, costly nor held out")
+        yield Problem(
+            "observations", None, "expected one that is neither derived, costly nor held out"
+        )
     for label, given in file.sets.items():
         for name, parameter in file.parameters.items():
             value, (low, high) = given.get(name), parameter.range
             if value is None or not low <= value <= high:
                 expected = f"expected a number in the range of the parameter, {low:g} to {high:g}"
-                yield Problem(f"sets.{label}.{name}", None if value is None else f"{value:g}", expected)
+                yield Problem(
+                    f"sets.{label}.{name}", None if value is None else f"{value:g}", expected
+                )
 
 
 def _problems_of_keys(file: CalibrationFile, varied: Collection[str]) -> Iterator[Problem]:
@@ -226,11 +280,11 @@ def _problems_of_keys(file: CalibrationFile, varied: Collection[str]) -> Iterato
             expected = "missing; expected it here or in [set]: other experiments change it"
             yield Problem(f"experiments.{label}.{key}", None, expected)
         given = [
-            parameter.keys for parameter in file.parameters.values() if label in (parameter.experiments or [label])
+            parameter.keys
+            for parameter in file.parameters.values()
+            if label in (parameter.experiments or [label])
         ]
         for key, number in ((key, sum(key in keys for keys in given)) for key in every):
             if number != 1:
-                expected = (
-                    f"expected one parameter that sets {key} for {label}, or none for any experiment; {number} do"
-                )
+                expected = f"expected one parameter that sets {key} for {label}, or none for any experiment; {number} do"
                 yield Problem("parameters", None, expected)

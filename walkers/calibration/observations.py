@@ -37,7 +37,9 @@ ASTRAY = np.pi / 4.0
 """Largest final angle of a walker that is on the axis, rad."""
 Angle = Literal["largest_angle", "smallest_angle"]
 """Of all walkers to the drive axis at the end of the run, in either direction, 0 to 90 degrees."""
-NO_NUMBERS: dict[str, float] = dict.fromkeys((*get_args(Speed), *get_args(Slip), *get_args(Angle)), nan)
+NO_NUMBERS: dict[str, float] = dict.fromkeys(
+    (*get_args(Speed), *get_args(Slip), *get_args(Angle)), nan
+)
 """Quantities of a run that failed."""
 LEAST_SPEED = 5e-5
 """m/s; a ratio to a smaller speed has no meaning."""
@@ -76,9 +78,17 @@ class Observation(Table):
     def _number(cls, value: Any, validation: ValidationInfo) -> Any:
         if validation.context != WRITTEN:
             return value
-        kind = None if validation.data.get("over") else kind_of(validation.data.get("quantity", "velocity"))
+        kind = (
+            None
+            if validation.data.get("over")
+            else kind_of(validation.data.get("quantity", "velocity"))
+        )
         if isinstance(value, str) == (kind is None):
-            raise ValueError(kind.expectation if kind else "expected a plain number: a ratio or a share has no unit")
+            raise ValueError(
+                kind.expectation
+                if kind
+                else "expected a plain number: a ratio or a share has no unit"
+            )
         number = parse_quantity(value, kind) if kind else value
         return degrees(number) if kind is ANGLE else number
 
@@ -98,14 +108,18 @@ class Observation(Table):
         """Smallest and largest number that the fact allows, without its deviation; both are the value if it has one."""
         if self.value is not None:
             return self.value, self.value
-        return (-inf if self.least is None else self.least), (inf if self.most is None else self.most)
+        return (-inf if self.least is None else self.least), (
+            inf if self.most is None else self.most
+        )
 
     @property
     def text(self) -> str:
         """What is expected, such as ``2.3 ± 0.35 mm/s`` or ``at least 0.3 ± 0.1``."""
         unit, scale = self.unit
         named = {"": self.value, "at least ": self.least, "at most ": self.most}
-        limits = " and ".join(f"{word}{number * scale:.4g}" for word, number in named.items() if number is not None)
+        limits = " and ".join(
+            f"{word}{number * scale:.4g}" for word, number in named.items() if number is not None
+        )
         return f"{limits} ± {self.deviation * scale:.2g} {unit}".strip()
 
     def of_numbers(self, numbers: Mapping[str, Mapping[str, float]]) -> float:

@@ -36,14 +36,20 @@ def write_outcome(outcome: Outcome, to: Path) -> list[Path]:
 
     to.mkdir(parents=True, exist_ok=True)
     record, calibration = record_of(outcome), outcome.calibration
-    samples = pd.DataFrame(calibration.values(outcome.posterior.samples), columns=[*calibration.file.parameters])
-    files = [to / file for file in ("posterior.parquet", RECORD_NAME, "calibration.md", "best.toml")]
+    samples = pd.DataFrame(
+        calibration.values(outcome.posterior.samples), columns=[*calibration.file.parameters]
+    )
+    files = [
+        to / file for file in ("posterior.parquet", RECORD_NAME, "calibration.md", "best.toml")
+    ]
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
     write_bytes(files[3], toml_bytes(best_case(calibration, outcome.sets[PROPOSED[0]], samples)))
     write_bytes(files[2], rendered("walkers.calibration", "report.md.j2", found=record).encode())
     sources = [f"{calibration.name}-{part}" for part in ("named", "round", "proposed")]
-    return files + save_figure(draw_facts(outcome), to / "predictions.png", sources, title=record["title"])
+    return files + save_figure(
+        draw_facts(outcome), to / "predictions.png", sources, title=record["title"]
+    )
 
 
 def best_case(calibration: Calibration, best: FloatArray, samples: pd.DataFrame) -> dict[str, Any]:
@@ -57,7 +63,9 @@ def best_case(calibration: Calibration, best: FloatArray, samples: pd.DataFrame)
         ends = [min(low, values[name]), max(high, values[name])]
         if ends[0] < ends[1] and first in (parameter.experiments or [first]):
             written = [parameter.written(end) for end in ends]
-            ranges |= dict.fromkeys(parameter.keys, {"loguniform": written} if parameter.log else written)
+            ranges |= dict.fromkeys(
+                parameter.keys, {"loguniform": written} if parameter.log else written
+            )
     return {**tables, "uncertain": ranges}
 
 
@@ -69,9 +77,15 @@ def record_of(outcome: Outcome) -> dict[str, Any]:
     """Contents of ``calibration.json``; observations in mm/s and degrees."""
     calibration, parameters = outcome.calibration, outcome.calibration.file.parameters
     samples = dict(zip(parameters, calibration.values(outcome.posterior.samples).T, strict=True))
-    prior = {name: parameter.values(np.array(_ENDS)).tolist() for name, parameter in parameters.items()}
+    prior = {
+        name: parameter.values(np.array(_ENDS)).tolist() for name, parameter in parameters.items()
+    }
     # Parameters that set the same keys in different experiments: where a ratio of 1 is likely, one value would do.
-    alike = [two for two in combinations(parameters, 2) if parameters[two[0]].keys == parameters[two[1]].keys]
+    alike = [
+        two
+        for two in combinations(parameters, 2)
+        if parameters[two[0]].keys == parameters[two[1]].keys
+    ]
     samples |= {f"{second}/{first}": samples[second] / samples[first] for first, second in alike}
     rows = [_row(outcome, place) for place in range(len(calibration.file.observations))]
     values = calibration.values(np.stack([*outcome.sets.values()])).tolist()
@@ -82,12 +96,23 @@ def record_of(outcome: Outcome) -> dict[str, Any]:
         "settings": calibration.file.model_dump(mode="json"),
         "labels": {name: parameter.label or name for name, parameter in parameters.items()},
         "number": outcome.number,
-        "sets": {name: dict(zip(parameters, row, strict=True)) for name, row in zip(outcome.sets, values, strict=True)},
-        "agree": {name: sum(row["agrees"][name] for row in rows if not row["derived"]) for name in outcome.sets},
+        "sets": {
+            name: dict(zip(parameters, row, strict=True))
+            for name, row in zip(outcome.sets, values, strict=True)
+        },
+        "agree": {
+            name: sum(row["agrees"][name] for row in rows if not row["derived"])
+            for name in outcome.sets
+        },
         "of": sum(not row["derived"] for row in rows),
-        "posterior": {name: [float(end) for end in np.quantile(column, _ENDS)] for name, column in samples.items()},
+        "posterior": {
+            name: [float(end) for end in np.quantile(column, _ENDS)]
+            for name, column in samples.items()
+        },
         "prior": prior,
-        "effective_samples": [posterior.effective_samples for posterior in (outcome.posterior, outcome.held_out)],
+        "effective_samples": [
+            posterior.effective_samples for posterior in (outcome.posterior, outcome.held_out)
+        ],
         "observations": rows,
     }
 
@@ -112,13 +137,18 @@ def summary(record: Mapping[str, Any]) -> str:
 def _row(outcome: Outcome, place: int) -> dict[str, Any]:
     """A fact, its number at the sets, and its prediction if it was held out."""
     observation = outcome.calibration.file.observations[place]
-    (unit, scale), numbers = observation.unit, {name: float(row[place]) for name, row in outcome.numbers.items()}
+    (unit, scale), numbers = (
+        observation.unit,
+        {name: float(row[place]) for name, row in outcome.numbers.items()},
+    )
     ends, emulator = outcome.predicted(observation), outcome.emulators.get(observation.name)
     return {
         **{name: getattr(observation, name) for name in ("name", "group", "title", "derived")},
         "expected": observation.text,
         "unit": unit,
-        "numbers": {name: number * scale if isfinite(number) else None for name, number in numbers.items()},
+        "numbers": {
+            name: number * scale if isfinite(number) else None for name, number in numbers.items()
+        },
         "agrees": {name: observation.agrees(number) for name, number in numbers.items()},
         "emulator_error": emulator and emulator.error,
         "predicted": None if ends is None else (ends * scale).tolist(),
@@ -132,14 +162,20 @@ def draw_facts(outcome: Outcome) -> Figure:
     figure, axes = new_figure(TWO_COLUMNS, 0.25 * len(facts) + 1.5)
     places = np.arange(len(facts))[::-1]
     axes.axvspan(-1.0, 1.0, color="0.9", lw=0)
-    for (name, numbers), marker in zip(outcome.numbers.items(), "os^DvPX*" * len(outcome.sets), strict=False):
+    for (name, numbers), marker in zip(
+        outcome.numbers.items(), "os^DvPX*" * len(outcome.sets), strict=False
+    ):
         away = [fact.residual(number) for fact, number in zip(facts, numbers, strict=True)]
         axes.plot(away, places, marker, ms=4, mfc="none", ls="none", label=name)
     for fact, place in zip(facts, places, strict=True):
         if (ends := outcome.predicted(fact)) is not None:
-            axes.hlines(place - 0.25, fact.residual(ends[0]), fact.residual(ends[2]), color="k", lw=1.0)
+            axes.hlines(
+                place - 0.25, fact.residual(ends[0]), fact.residual(ends[2]), color="k", lw=1.0
+            )
     axes.set_yticks(places, [fact.title for fact in facts], fontsize=7)
-    axes.set(xlabel="distance from the fact/deviation (lines: predicted)", ylim=(-0.8, len(facts) - 0.2))
+    axes.set(
+        xlabel="distance from the fact/deviation (lines: predicted)", ylim=(-0.8, len(facts) - 0.2)
+    )
     axes.set_xscale("symlog", linthresh=3.0)
     figure.legend(loc="outside upper center", ncols=2)
     return figure

@@ -48,15 +48,23 @@ class Entry:
 def catalogue() -> list[Entry]:
     """All names: of the program, and of the library in the working directory; `InputError` if that cannot be used."""
     entries = list(_of_library(Library(read_library(Path()))))
-    entries += [Entry("not measured", key, numbers={"default": number}) for key, number in unmeasured().items()]
+    entries += [
+        Entry("not measured", key, numbers={"default": number})
+        for key, number in unmeasured().items()
+    ]
     for name in LAWS:
         module = f"{name.replace('-', '_')}.py"
         source = resources.files("walkers.physics.laws").joinpath(module).read_text("utf-8")
-        summary = str(ast.get_docstring(ast.parse(source))).splitlines()[0]  # without its imports, which are slow
+        summary = str(ast.get_docstring(ast.parse(source))).splitlines()[
+            0
+        ]  # without its imports, which are slow
         entries.append(Entry("bridge laws", name, text=summary))
     for kind in COMMANDS:
         files = shipped(kind[:-1]).items()
-        entries += [Entry(kind, name, "", {}, str(read_toml(file).get("title", "")), str(file)) for name, file in files]
+        entries += [
+            Entry(kind, name, "", {}, str(read_toml(file).get("title", "")), str(file))
+            for name, file in files
+        ]
     return entries
 
 
@@ -65,11 +73,20 @@ def _of_library(library: Library) -> Iterator[Entry]:
         for name in collection.tables.get("materials", ()):
             yield Entry("materials", name, collection.place, library.numbers("materials", name))
         for name in collection.tables.get("liquids", ()):
-            note = f"at mass_fraction = {HALF[0]}, {quantity_text(HALF[1], TEMPERATURE)}" if name in MIXTURES else ""
+            note = (
+                f"at mass_fraction = {HALF[0]}, {quantity_text(HALF[1], TEMPERATURE)}"
+                if name in MIXTURES
+                else ""
+            )
             yield Entry("liquids", name, collection.place, library.numbers("liquids", name), note)
         for pair in collection.tables.get("surface_pairs", ()):
             first, second = pair["materials"]
-            yield Entry("surface pairs", f"{first} on {second}", collection.place, library.surface_pair(first, second))
+            yield Entry(
+                "surface pairs",
+                f"{first} on {second}",
+                collection.place,
+                library.surface_pair(first, second),
+            )
 
 
 def describe(entries: Sequence[Entry]) -> str:
@@ -78,11 +95,23 @@ def describe(entries: Sequence[Entry]) -> str:
     for kind, columns in _COLUMNS.items():
         if kind == "not measured":
             lines += ["", NOT_KNOWN]
-        rows = [[kind.capitalize(), *(_HEADS.get(column, column.replace("_", " ")) for column in columns), ""]]
+        rows = [
+            [
+                kind.capitalize(),
+                *(_HEADS.get(column, column.replace("_", " ")) for column in columns),
+                "",
+            ]
+        ]
         for entry in entries:
             if entry.kind == kind:
                 note = f"{entry.text} [{entry.place}]" if entry.place else entry.text
-                rows.append([f"  {entry.name}", *(_cell(entry.numbers, column) for column in columns), note.strip()])
+                rows.append(
+                    [
+                        f"  {entry.name}",
+                        *(_cell(entry.numbers, column) for column in columns),
+                        note.strip(),
+                    ]
+                )
         lines += ["", aligned(rows)]
     return "\n".join(lines[1:])
 
@@ -108,14 +137,22 @@ def describe_one(entries: Sequence[Entry], name: str) -> str:
     matching += [pair for pair in pairs if matching[0].name in pair.name.split(" on ")]
     lines = []
     for entry in matching:
-        lines.append(": ".join(filter(None, (entry.name, entry.text))) + (f" [{entry.place}]" if entry.place else ""))
+        lines.append(
+            ": ".join(filter(None, (entry.name, entry.text)))
+            + (f" [{entry.place}]" if entry.place else "")
+        )
         if entry.kind in COMMANDS:
-            lines += [f"  {entry.file}" * bool(entry.file), f"  walkers {COMMANDS[entry.kind]} {entry.name}"]
+            lines += [
+                f"  {entry.file}" * bool(entry.file),
+                f"  walkers {COMMANDS[entry.kind]} {entry.name}",
+            ]
         width = max(map(len, entry.numbers), default=0)
         lines += [
             f"  {key:{width}}  {_cell(entry.numbers, key):28}  {number.source}".rstrip()
             for key, number in entry.numbers.items()
         ]
     if matching[0].kind == "materials":
-        lines.append(f"The friction of {matching[0].name} on other wet surfaces is not measured; see walkers library.")
+        lines.append(
+            f"The friction of {matching[0].name} on other wet surfaces is not measured; see walkers library."
+        )
     return "\n".join(filter(None, lines))

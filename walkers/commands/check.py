@@ -103,7 +103,11 @@ def case(
     from walkers.second_engine.engine import TERMS
 
     loaded = find(case, at.out, at.values).case
-    refuse("--seeds", seeds > 1 and loaded.mixture is None, "is for piles: walkers and placed beads have one start")
+    refuse(
+        "--seeds",
+        seeds > 1 and loaded.mixture is None,
+        "is for piles: walkers and placed beads have one start",
+    )
     for term in without or ():
         refuse(f"--without {term}", term not in TERMS, f"expected one of {', '.join(TERMS)}")
     try:

@@ -22,7 +22,9 @@ from walkers.runs.removal import Removal, describe, remove, unfinished_in
 from walkers.sweeps.removal import named_in
 from walkers.templates.deck import RUN_NAME, render_deck, whole
 
-_REMOVED = "Runs, with their spreads and accuracies, and sweeps, with the runs that no other sweep has."
+_REMOVED = (
+    "Runs, with their spreads and accuracies, and sweeps, with the runs that no other sweep has."
+)
 
 
 @Parameter(name="*")
@@ -80,7 +82,9 @@ def export(
     if to is None:
         print(render_deck(case, whole(case)).text, end="")
     else:
-        print(f"{write_folder(case, to)}    run it there with: sh {RUN_NAME}    then: walkers run {to}")
+        print(
+            f"{write_folder(case, to)}    run it there with: sh {RUN_NAME}    then: walkers run {to}"
+        )
     if case.run.continuation:
         tell(f"{case.run.attempts[0]} cycles; {case.run.continuation}")
 
@@ -102,7 +106,11 @@ def clean(
     if not removals:
         return 0
     if not yes:
-        refuse("--yes", not sys.stdin.isatty(), "expected, because there is no terminal to ask for confirmation")
+        refuse(
+            "--yes",
+            not sys.stdin.isatty(),
+            "expected, because there is no terminal to ask for confirmation",
+        )
         if not _is_confirmed("remove them?"):
             print("nothing removed")
             return 0

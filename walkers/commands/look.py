@@ -9,7 +9,18 @@ from cyclopts import Parameter
 
 import walkers
 from walkers import DEFAULT_OUT
-from walkers.commands.options import At, Formats, Json, Out, Run, RunOrSweep, print_as, print_lines, refuse, refuse_any
+from walkers.commands.options import (
+    At,
+    Formats,
+    Json,
+    Out,
+    Run,
+    RunOrSweep,
+    print_as,
+    print_lines,
+    refuse,
+    refuse_any,
+)
 from walkers.postprocess.show.film_options import FilmOptions, Seconds
 from walkers.sweeps.figure_options import FigureOptions
 
@@ -63,7 +74,11 @@ def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
     kind = named.kind
     refuse(name, kind == "run", f"is a run: walkers run {name} prints its result")
     refuse(name, kind == "case", f"no sweep in {out}; walkers list shows what is there")
-    refuse(name, kind != "sweep", f"not a sweep: expected a folder with a sweep.json (walkers list --out {name}?)")
+    refuse(
+        name,
+        kind != "sweep",
+        f"not a sweep: expected a folder with a sweep.json (walkers list --out {name}?)",
+    )
     found_sweep = Sweep(named.path)
     if to is not None:
         table.write_table_file(found_sweep.table(), to)
@@ -125,8 +140,12 @@ def render(
         print(at.run(run).film(to, progress=True, **vars(options)))
         return
     usual = vars(FilmOptions(walker=options.walker))
-    refuse_any({name: value != usual[name] for name, value in vars(options).items()}, "is for --film")
-    print_lines(at.run(run).render(to, images=6 if images is None else images, walker=options.walker))
+    refuse_any(
+        {name: value != usual[name] for name, value in vars(options).items()}, "is for --film"
+    )
+    print_lines(
+        at.run(run).render(to, images=6 if images is None else images, walker=options.walker)
+    )
 
 
 def report(name: RunOrSweep, /, *, at: At = At(), to: Path | None = None) -> None:

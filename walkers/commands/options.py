@@ -29,7 +29,9 @@ def _names(context: CompletionContext) -> list[str]:
     from walkers.inputs.reading import shipped
 
     out = Path(context["out"].raw or DEFAULT_OUT)
-    records = sorted(path.parent.name for file in RECORDS.values() for path in out.glob(f"*/{file}"))
+    records = sorted(
+        path.parent.name for file in RECORDS.values() for path in out.glob(f"*/{file}")
+    )
     return [*(path.name for path in Path().glob("*.toml")), *shipped("case"), *records]
 
 
@@ -39,15 +41,24 @@ _CASE = "A case file, the name of a shipped case such as fig1b, or a run (name o
 _RUN = "its folder, its name in --out, or its case (file or name)."
 Case = Annotated[str, Parameter(name="CASE", completer=_names, help=_CASE)]
 Run = Annotated[str, Parameter(name="RUN", completer=_names, help=f"A run: {_RUN}")]
-RunOrSweep = Annotated[str, Parameter(name="RUN|SWEEP", completer=_names, help=f"A run or a sweep: {_RUN}")]
+RunOrSweep = Annotated[
+    str, Parameter(name="RUN|SWEEP", completer=_names, help=f"A run or a sweep: {_RUN}")
+]
 Folder = Annotated[Path, Parameter(validator=OfPath(file_okay=False))]
 Out = Annotated[Folder, Parameter(help="Folder that contains the runs.")]
 Jobs = Annotated[
     int | None,
-    Parameter(("--jobs", "-j"), validator=AT_LEAST_1, help="Number of parallel decks; default: one per core."),
+    Parameter(
+        ("--jobs", "-j"),
+        validator=AT_LEAST_1,
+        help="Number of parallel decks; default: one per core.",
+    ),
 ]
 Json = Annotated[bool, Parameter("--json", help="Print JSON in SI units.")]
-Formats = Annotated[list[str] | None, Parameter("--format", help="Format of the figures: png, svg or pdf. Repeatable.")]
+Formats = Annotated[
+    list[str] | None,
+    Parameter("--format", help="Format of the figures: png, svg or pdf. Repeatable."),
+]
 
 
 @Parameter(name="*")
@@ -94,7 +105,9 @@ def _check_engine(_: object, name: str | None) -> None:
         raise refused(f"--engine {name}", "expected the name or path of a liggghts binary")
 
 
-Engine = Annotated[str | None, Parameter(validator=_check_engine, help="Name or path of the liggghts binary.")]
+Engine = Annotated[
+    str | None, Parameter(validator=_check_engine, help="Name or path of the liggghts binary.")
+]
 
 
 def refuse(option: str, wrong: bool, why: str) -> None:

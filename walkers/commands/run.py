@@ -9,7 +9,18 @@ from typing import Annotated
 from cyclopts import Parameter
 
 import walkers
-from walkers.commands.options import NOT_NEGATIVE, At, Case, Engine, Jobs, Json, print_as, print_lines, refuse, tell
+from walkers.commands.options import (
+    NOT_NEGATIVE,
+    At,
+    Case,
+    Engine,
+    Jobs,
+    Json,
+    print_as,
+    print_lines,
+    refuse,
+    tell,
+)
 from walkers.errors import apply_all
 from walkers.progress import progress_of
 from walkers.rounding import duration_text
@@ -53,7 +64,9 @@ def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = 
         from walkers.theory.prediction import describe as describe_prediction
 
         predicted = walkers.predict(case, at.out, at.values)
-        print_as(as_json, lambda: predicted, lambda: describe_prediction(predicted, predicted["engine"]))
+        print_as(
+            as_json, lambda: predicted, lambda: describe_prediction(predicted, predicted["engine"])
+        )
         return
     from walkers.runs.names import find
     from walkers.runs.preview import describe, summarise
@@ -119,7 +132,9 @@ def run(
         folder = reference.folder
         tell(*(f"{case.name}: {note}" for note in notes(case) if earlier is None))
         try:
-            done = earlier or walkers.run(case, folder, engine=engine, force=force, progress=True, time_limit=limit)
+            done = earlier or walkers.run(
+                case, folder, engine=engine, force=force, progress=True, time_limit=limit
+            )
         except EngineFailure as failure:
             tell(f"{case.name}: {failure}")
             failed = True
@@ -130,7 +145,16 @@ def run(
         failed |= bool(band and band.failures)
         if as_json:
             ranges = {"spread": band.as_dict()} if band else {}
-            print(json.dumps({**done.result.as_dict(), **ranges, "run": str(done.directory), "cached": done.cached}))
+            print(
+                json.dumps(
+                    {
+                        **done.result.as_dict(),
+                        **ranges,
+                        "run": str(done.directory),
+                        "cached": done.cached,
+                    }
+                )
+            )
         else:
             print_lines([done.describe(), *([describe(band)] if band else [])])
     return 1 if failed else 0
@@ -174,7 +198,11 @@ def sweep(
 
     draws = _draws(spread, points)
     loaded = load_sweep(sweep, at.values)
-    refuse("--jobs", jobs is not None and site is not None, "the site file sets how many decks run at once")
+    refuse(
+        "--jobs",
+        jobs is not None and site is not None,
+        "the site file sets how many decks run at once",
+    )
     if len(loaded.rows) > _MANY:
         duration = duration_text(len(loaded.rows) / _RESOLVED_PER_SECOND)
         tell(f"{loaded.name}: resolving {len(loaded.rows)} points, which takes about {duration}")
@@ -186,7 +214,10 @@ def sweep(
         if spread:
             sweeps = (spread_sweep(case, draws, engine) for case in loaded.cases())
             plans = [plan_sweep(drawn, at.out, options, engine) for drawn in sweeps]
-            seconds, more = (sum(plan.core_seconds for plan in plans), sum(len(plan.missing) for plan in plans))
+            seconds, more = (
+                sum(plan.core_seconds for plan in plans),
+                sum(len(plan.missing) for plan in plans),
+            )
             print(f"  spread     {more} more runs, predicted {seconds:.0f} core-seconds")
         return 0
     done = walkers.sweep(
@@ -203,5 +234,7 @@ def sweep(
     tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in done.failures))
     print(f"{done.summary()}\n  table      walkers list {done.directory}")
     origins = next(loaded.cases()).origins  # the table has the values of varied keys
-    print_lines(lines_of_rest(rests_on([origin for origin in origins if origin.key not in loaded.keys])))
+    print_lines(
+        lines_of_rest(rests_on([origin for origin in origins if origin.key not in loaded.keys]))
+    )
     return 1 if done.failures else 0

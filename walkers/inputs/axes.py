@@ -29,8 +29,12 @@ class Range(NamedTuple):
 
     def at(self, shares: FloatArray) -> FloatArray:
         """Quantiles of the range."""
-        ends = np.array([self.low, self.high] if self.median is None else [self.low, self.median, self.high])
-        numbers = np.interp(shares, np.linspace(0.0, 1.0, len(ends)), np.log(ends) if self.logarithmic else ends)
+        ends = np.array(
+            [self.low, self.high] if self.median is None else [self.low, self.median, self.high]
+        )
+        numbers = np.interp(
+            shares, np.linspace(0.0, 1.0, len(ends)), np.log(ends) if self.logarithmic else ends
+        )
         return np.asarray(np.exp(numbers) if self.logarithmic else numbers)
 
 
@@ -58,11 +62,18 @@ def values_of(key: str, axis: object) -> list[Value]:
             raise unusable(key, "expected at least one value", axis)
         unit_of(key, axis)
         return axis
-    kind, given = next(iter(axis.items())) if isinstance(axis, Mapping) and len(axis) == 1 else ("", None)
+    kind, given = (
+        next(iter(axis.items())) if isinstance(axis, Mapping) and len(axis) == 1 else ("", None)
+    )
     if kind not in SPACINGS:
         message = "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
         raise unusable(key, message, axis)
-    if not (isinstance(given, list) and len(given) == 3 and type(given[2]) is int and 1 <= given[2] <= MOST_POINTS):
+    if not (
+        isinstance(given, list)
+        and len(given) == 3
+        and type(given[2]) is int
+        and 1 <= given[2] <= MOST_POINTS
+    ):
         message = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
         raise unusable(key, message, axis)
     (first, last), unit = _numbers(key, given[:2], positive=kind == "geomspace")
@@ -115,7 +126,9 @@ def listed(key: str, given: object) -> Axis:
     values = values_of(key, given)
     occurred: set[str] = set()
     for value in values:
-        same = repr([as_quantity(part) or part for part in (value if isinstance(value, list) else [value])])
+        same = repr(
+            [as_quantity(part) or part for part in (value if isinstance(value, list) else [value])]
+        )
         if same in occurred:
             raise unusable(key, "expected different values: this one occurs twice", value)
         occurred.add(same)
@@ -155,7 +168,9 @@ def sampled(points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
         raise unusable("sample.ranges", "expected keys and their ranges", dict(ranges))
     shares = zip(unit_cube(len(ends), points, seed).T, ends.items(), strict=True)
     drawn = ((key, span.unit, span.at(share).tolist()) for share, (key, span) in shares)
-    return Axis.of({key: [written(number, unit) for number in numbers] for key, unit, numbers in drawn})
+    return Axis.of(
+        {key: [written(number, unit) for number in numbers] for key, unit, numbers in drawn}
+    )
 
 
 def descending(key: str, ends: Mapping[str, Value]) -> Axis:
@@ -164,7 +179,11 @@ def descending(key: str, ends: Mapping[str, Value]) -> Axis:
     unit = unit_of(key, list(ends.values()))
     if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
         first, last, _ = ends.values()
-        raise unusable("descend", "`from` must not be below `to`, and `step` must be positive", f"{first} to {last}")
+        raise unusable(
+            "descend",
+            "`from` must not be below `to`, and `step` must be positive",
+            f"{first} to {last}",
+        )
     number = int((start - to) / step + 1e-9) + 1
     return Axis.of({key: [written(start - step * count, unit) for count in range(number)]})
 
@@ -219,7 +238,9 @@ def unit_cube(dimensions: int, points: int, seed: int) -> FloatArray:
     from scipy.stats import qmc
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # a number of points that is no power of two is the user's choice
+        warnings.simplefilter(
+            "ignore", UserWarning
+        )  # a number of points that is no power of two is the user's choice
         return np.asarray(qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(points))
 
 
@@ -228,8 +249,14 @@ def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Valu
     keys = tuple(key for axis in axes for key in axis.keys)
     for number, key in enumerate(keys):
         list_of = key.partition("[")[0]
-        if any(earlier in (key, list_of) or earlier.partition("[")[0] == key for earlier in keys[:number]):
+        if any(
+            earlier in (key, list_of) or earlier.partition("[")[0] == key
+            for earlier in keys[:number]
+        ):
             raise unusable(key, "varies on two axes; expected one")
     if (many := prod(len(axis.rows) for axis in axes)) > MOST_POINTS:
         raise unusable("axes", f"{many} points; expected at most {MOST_POINTS}")
-    return keys, [tuple(value for row in rows for value in row) for rows in product(*(axis.rows for axis in axes))]
+    return keys, [
+        tuple(value for row in rows for value in row)
+        for rows in product(*(axis.rows for axis in axes))
+    ]

@@ -39,7 +39,9 @@ def source_of(name: str) -> Path | None:
         return None
     place, _, function = name.rpartition(":")
     if not place.endswith(".py") or not function or not name.isprintable():
-        raise ValueError(f"bridge law {name!r}: expected one of {', '.join(LAWS)}, or file.py:function")
+        raise ValueError(
+            f"bridge law {name!r}: expected one of {', '.join(LAWS)}, or file.py:function"
+        )
     return Path(place).resolve()
 
 
@@ -60,5 +62,7 @@ def _of_user(name: str, file: Path, sha256: str | None) -> BridgeLaw:
 
     del sha256
     if not file.is_relative_to(Path(__file__).parents[1]):
-        warnings.warn(f"executes {file}, the bridge law of the case", ExecutedLawWarning, stacklevel=3)
+        warnings.warn(
+            f"executes {file}, the bridge law of the case", ExecutedLawWarning, stacklevel=3
+        )
     return loaded(name, file)

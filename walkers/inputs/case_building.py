@@ -132,10 +132,14 @@ def _with_record(document: dict[str, Any]) -> dict[str, Any]:
 def _validated(tables: Mapping[str, Any], unknown: list[Problem], source: str) -> CaseFile:
     """The tables as a case file; ``unknown`` are problems of names that the library lacks."""
     try:
-        return validated(CaseFile, tables, source, further=[*unknown, *contradictions(CaseFile, tables)])
+        return validated(
+            CaseFile, tables, source, further=[*unknown, *contradictions(CaseFile, tables)]
+        )
     except InputError as error:
         # What the library would have given under another name is not missing too.
-        misnamed = unknown or any(problem.key in NAMES and problem.value for problem in error.problems)
+        misnamed = unknown or any(
+            problem.key in NAMES and problem.value for problem in error.problems
+        )
         hidden = SUPPLIED if misnamed else ()
         kept = [problem for problem in error.problems if problem.value or problem.key not in hidden]
         raise InputError(source, kept) from error

@@ -20,7 +20,12 @@ T = TypeVar("T")
 Completed = TypeVar("Completed", bound="Table")
 SAME_RUN = "same run"
 """Annotation of a key: another value does not make another run, by itself."""
-_TYPES: Mapping[Any, str] = {str: "text in quotes", int: "a whole number", list: "a list", dict: "a table"}
+_TYPES: Mapping[Any, str] = {
+    str: "text in quotes",
+    int: "a whole number",
+    list: "a list",
+    dict: "a table",
+}
 
 
 def _only_derived(value: object, validation: ValidationInfo) -> object:
@@ -38,7 +43,9 @@ Derived = Annotated[T, _DERIVED, SkipJsonSchema()]
 
 def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **bounds: Any) -> Any:
     """A key of a table: its meaning, default (required without one), an example as a file has it, and bounds."""
-    return Field(default, description=meaning, examples=None if example is None else [example], **bounds)
+    return Field(
+        default, description=meaning, examples=None if example is None else [example], **bounds
+    )
 
 
 class Choice:
@@ -54,7 +61,9 @@ class Choice:
         In words, what may stand in the place of these keys.
     """
 
-    def __init__(self, *expressions: tuple[str, ...], required: bool = True, instead: str = "") -> None:
+    def __init__(
+        self, *expressions: tuple[str, ...], required: bool = True, instead: str = ""
+    ) -> None:
         self.expressions = expressions
         self.required = required
         self.instead = instead
@@ -176,14 +185,22 @@ class Table(BaseModel):
     @classmethod
     def problems_of(cls, choice: Choice, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
         """The problem of a table that has several expressions of a choice, or a part of one, or none."""
-        begun = [names for names in choice.expressions if any(not is_auto(given.get(name, "auto")) for name in names)]
+        begun = [
+            names
+            for names in choice.expressions
+            if any(not is_auto(given.get(name, "auto")) for name in names)
+        ]
         if len(begun) > 1:
             name = next(name for name in begun[1] if name in given)
             two = " or ".join(map(" and ".join, begun[:2]))
             yield Problem(within(place, name), None, f"expected either {two}, not both")
         elif begun or choice.required:
             expected = begun[0] if begun else choice.expressions[0]
-            instead = [" and ".join(names) for names in choice.expressions if not begun and names != expected]
+            instead = [
+                " and ".join(names)
+                for names in choice.expressions
+                if not begun and names != expected
+            ]
             instead += [choice.instead] if choice.instead else []
             for name in (name for name in expected if name not in given):
                 yield cls.missing(name, place, "".join(f", or {words}" for words in instead))
@@ -191,7 +208,11 @@ class Table(BaseModel):
     @classmethod
     def missing(cls, name: str, place: str, instead: str = "") -> Problem:
         """The problem of a missing key of a table at a place, with an example, and alternatives."""
-        return Problem(within(place, name), None, f"missing; expected {example_of(cls.model_fields[name])}{instead}")
+        return Problem(
+            within(place, name),
+            None,
+            f"missing; expected {example_of(cls.model_fields[name])}{instead}",
+        )
 
 
 def present(value: T | None, name: str) -> T:
@@ -218,7 +239,10 @@ def keys_of(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     """All dotted keys of a kind of file with their fields; ``.*`` stands for names of the user's."""
     keys: dict[str, FieldInfo] = {}
     for name, field in keys_in(model).items():
-        table, names = table_in(field.annotation), f"{name}.*" if get_origin(field.annotation) is dict else name
+        table, names = (
+            table_in(field.annotation),
+            f"{name}.*" if get_origin(field.annotation) is dict else name,
+        )
         keys |= {name: field, names: field} if table else {name: field}
         keys |= {f"{names}.{key}": below for key, below in keys_of(table).items()} if table else {}
     return keys
@@ -245,13 +269,17 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
     """Contradictions and gaps of the tables of a document (`Table.problems`)."""
     if not isinstance(document, Mapping):
         return
-    yield from model.problems({name: value for name, value in document.items() if value != []}, place)
+    yield from model.problems(
+        {name: value for name, value in document.items() if value != []}, place
+    )
     for name, below in document.items():
         field, where = keys_in(model).get(name), within(place, name)
         if field is None or (inner := table_in(field.annotation)) is None:
             continue
         for number, entry in enumerate(below if isinstance(below, list) else [below]):
-            yield from contradictions(inner, entry, f"{where}[{number}]" if isinstance(below, list) else where)
+            yield from contradictions(
+                inner, entry, f"{where}[{number}]" if isinstance(below, list) else where
+            )
 
 
 def alternatives(model: type[Table], name: str) -> set[str]:
@@ -262,10 +290,14 @@ def alternatives(model: type[Table], name: str) -> set[str]:
         if (table := table_in(field.annotation) if field else None) is None:
             return set()
         model = table
-    return {joined([*path, name]) for choice in model.choices for name in choice.excluded_by(str(last))}
+    return {
+        joined([*path, name]) for choice in model.choices for name in choice.excluded_by(str(last))
+    }
 
 
-def changed(model: type[Table], document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def changed(
+    model: type[Table], document: Mapping[str, Any], changes: Mapping[str, Any]
+) -> dict[str, Any]:
     """A document with other values at dotted keys (``dimers.radii[0]`` for one of a list).
 
     Keys that a new one excludes (`Table.choices`) go, unless they change too.
@@ -283,11 +315,17 @@ def _put(tables: dict[str, Any], name: str, value: Any, instead_of: Collection[s
         above = parts[:number]
         if isinstance(part, int):
             if not isinstance(place, list) or part >= len(place):
-                expected = f"a place below [{len(place)}]" if isinstance(place, list) else "the whole list"
-                message = f"the base case has no {joined(above)} of that length; expected {expected}"
+                expected = (
+                    f"a place below [{len(place)}]" if isinstance(place, list) else "the whole list"
+                )
+                message = (
+                    f"the base case has no {joined(above)} of that length; expected {expected}"
+                )
                 raise unusable(name, message, value)
         elif isinstance(place, list):
-            raise unusable(name, f"{joined(above)} is a list: say which one, such as {joined(above)}[0]", value)
+            raise unusable(
+                name, f"{joined(above)} is a list: say which one, such as {joined(above)}[0]", value
+            )
         elif not isinstance(place, dict):  # the base case is wrong there, which its own check tells
             return
         if number + 1 < len(parts):

@@ -26,7 +26,9 @@ def parts_of(key: str) -> tuple[str | int, ...]:
 
 def joined(parts: Sequence[str | int]) -> str:
     """A dotted key of its parts."""
-    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts).removeprefix(".")
+    return "".join(
+        f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts
+    ).removeprefix(".")
 
 
 def value_at(document: Any, parts: Sequence[str | int]) -> Any:
@@ -69,7 +71,9 @@ def settings_of(words: Iterable[str]) -> dict[str, Value]:
     for word in words:
         key, separator, text = (part.strip() for part in word.partition("="))
         if not (key and separator and text):
-            raise InputError("--set", [Problem(word, None, "expected key=value, such as drive.frequency=70Hz")])
+            raise InputError(
+                "--set", [Problem(word, None, "expected key=value, such as drive.frequency=70Hz")]
+            )
         if key in settings:
             raise InputError("--set", [Problem(key, text, "is given twice; expected one value")])
         settings[key] = _value(text)

@@ -34,7 +34,9 @@ _SENTENCES = {
     "tuple_type": "expected a list",
     "literal_error": "expected {expected}",
     "value_error": "{error}",
-    **dict.fromkeys(("model_type", "dict_type", "model_attributes_type"), "expected a table [{key}]"),
+    **dict.fromkeys(
+        ("model_type", "dict_type", "model_attributes_type"), "expected a table [{key}]"
+    ),
 }
 """By the type of an error of pydantic, with the values of its context."""
 _GIVEN_ELSEWHERE = {"beads": "a material", "liquid": "a liquid", "contact": "surfaces"}
@@ -51,7 +53,10 @@ def quoted(document: Mapping[str, Any], parts: Sequence[str | int]) -> str | Non
 
 def _quoting(problems: Iterable[Problem], document: Mapping[str, Any]) -> list[Problem]:
     """Problems with the values at fault as the document has them."""
-    return [replace(problem, value=problem.value or quoted(document, parts_of(problem.key))) for problem in problems]
+    return [
+        replace(problem, value=problem.value or quoted(document, parts_of(problem.key)))
+        for problem in problems
+    ]
 
 
 @contextmanager
@@ -66,7 +71,11 @@ def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[
 
 
 def validated(
-    model: type[File], document: Mapping[str, Any], source: str, whole: str = "a case", further: Sequence[Problem] = ()
+    model: type[File],
+    document: Mapping[str, Any],
+    source: str,
+    whole: str = "a case",
+    further: Sequence[Problem] = (),
 ) -> File:
     """Nested tables as a kind of file (``whole``); raises `InputError` with all problems, the ``further`` ones too."""
     problems = {problem.key: problem for problem in _quoting(further, document)}
@@ -74,7 +83,9 @@ def validated(
         file = model.model_validate(document, context=WRITTEN)
     except ValidationError as error:
         # A default that follows from a wrong value is no problem of its own.
-        causes = (details for details in error.errors() if details["type"] != "default_factory_not_called")
+        causes = (
+            details for details in error.errors() if details["type"] != "default_factory_not_called"
+        )
         refused = [_problem_of(details, document, model, whole) for details in causes]
         problems = {problem.key: problem for problem in refused} | problems
     if problems:
@@ -82,7 +93,9 @@ def validated(
     return file
 
 
-def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel], whole: str) -> Problem:
+def _problem_of(
+    details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel], whole: str
+) -> Problem:
     kind, context = details["type"], details.get("ctx", {})
     location = tuple(part for part in details["loc"] if part != "[key]")  # of a name of the user's
     of_list = kind == "missing" and isinstance(location[-1], int)
@@ -91,12 +104,16 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
     example = example_of(field) if field else "a value"
     such = f", {example.removeprefix('a value ')}" if example.startswith("a value such as") else ""
     if kind == "extra_forbidden":
-        message = _unknown_key([str(part) for part in location if isinstance(part, str)], file, whole)
+        message = _unknown_key(
+            [str(part) for part in location if isinstance(part, str)], file, whole
+        )
     elif of_list or kind in ("too_long", "too_short"):
         value = value_at(document, parts_of(key))
         number = len(value) if isinstance(value, list) else 0
         bounds = {"max_length": "at most ", "min_length": "at least "}
-        bound = next((f"{word}{context[name]}" for name, word in bounds.items() if name in context), "")
+        bound = next(
+            (f"{word}{context[name]}" for name, word in bounds.items() if name in context), ""
+        )
         bound = bound or f"{int(location[-1]) + 1}"
         message = f"has {number} value{'s' * (number != 1)}; expected {bound}{such}"
     elif kind == "missing":
@@ -105,13 +122,26 @@ def _problem_of(details: ErrorDetails, document: Mapping[str, Any], file: type[B
             message += f", or {entry} of the library"
     else:
         form = _SENTENCES.get(kind, "expected {example}")
-        words = {"example": example, "such": such, "meaning": field.description if field else "", "key": key}
+        words = {
+            "example": example,
+            "such": such,
+            "meaning": field.description if field else "",
+            "key": key,
+        }
         message = form.format(**{**words, **context})
         if kind == "literal_error":
-            message += suggestion(str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"])))
+            message += suggestion(
+                str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"]))
+            )
         elif kind in ("list_type", "tuple_type") and field:
-            message = f"expected tables [[{key}]]" if table_in(field.annotation) else f"expected a list{such}"
-        elif kind in ("model_type", "dict_type") and str(context.get("class_name", "")).startswith("Sourced"):
+            message = (
+                f"expected tables [[{key}]]"
+                if table_in(field.annotation)
+                else f"expected a list{such}"
+            )
+        elif kind in ("model_type", "dict_type") and str(context.get("class_name", "")).startswith(
+            "Sourced"
+        ):
             message = 'expected { value = ..., source = "..." }'
         if field and AUTO in field.metadata and kind != "value_error":
             message += ', or "auto"'
@@ -144,9 +174,14 @@ def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     field = fields.get(_place(tables, fields))
     table = table_in(field.annotation) if field else None if tables else file
     siblings = list(keys_in(table)) if table else []
-    keys = {re.sub(r"^(clusters|placed|drive\.harmonics)\.", r"\1[0].", key): field for key, field in fields.items()}
+    keys = {
+        re.sub(r"^(clusters|placed|drive\.harmonics)\.", r"\1[0].", key): field
+        for key, field in fields.items()
+    }
     hint = suggestion(word, siblings) if siblings else suggestion(".".join(location), keys)
-    plain = [key for key, field in keys.items() if "*" not in key and not table_in(field.annotation)]
+    plain = [
+        key for key, field in keys.items() if "*" not in key and not table_in(field.annotation)
+    ]
     elsewhere = [key for key in plain if key.split(".")[-1] == word]
     if not hint and elsewhere:
         hint = f'; did you mean "{elsewhere[0]}"?'

@@ -41,9 +41,13 @@ def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[
     try:
         _write_new(path, f"#:schema {_SCHEMA}\n\n{text}" if schema else text)
     except FileExistsError as error:
-        raise refused(path, "exists already: it is not overwritten; expected another name") from error
+        raise refused(
+            path, "exists already: it is not overwritten; expected another name"
+        ) from error
     except OSError as error:
-        raise refused(path, f"cannot be written ({error.strerror}): expected a name in a folder that exists") from error
+        raise refused(
+            path, f"cannot be written ({error.strerror}): expected a name in a folder that exists"
+        ) from error
     if not schema:
         return [path]
     from walkers.inputs.schema import case_schema

@@ -33,10 +33,14 @@ class Origin:
     text: str  # the value as a case file would say it, with its unit
     origin: Whence
     source: str = ""  # of the library (after its file), or the values from which it is derived
-    range: tuple[Any, Any] | None = None  # ends between which an unmeasured or uncertain value may lie, as in a case
+    range: tuple[Any, Any] | None = (
+        None  # ends between which an unmeasured or uncertain value may lie, as in a case
+    )
     logarithmic: bool = False  # whether the range is of magnitudes
     uncertain: bool = False  # whether the case calls it so
-    value: Any = field(default=None, compare=False)  # SI; as text if the case says it in words, such as ``auto``
+    value: Any = field(
+        default=None, compare=False
+    )  # SI; as text if the case says it in words, such as ``auto``
 
     @property
     def guessed(self) -> bool:

@@ -33,7 +33,9 @@ def shipped(kind: str) -> dict[str, Path]:
     return {path.stem: path for path in sorted((_HERE / f"{kind}s").glob("*.toml"))}
 
 
-def load_case(case: str | Path | Mapping[str, Any], changes: Mapping[str, Any] | None = None) -> Case:
+def load_case(
+    case: str | Path | Mapping[str, Any], changes: Mapping[str, Any] | None = None
+) -> Case:
     """Read and resolve a case.
 
     Parameters
@@ -82,7 +84,10 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
         of_archive = value_at(document, ("meshes", mesh)) is not MISSING  # whose case has its mesh
         for table in {"records", "meshes"} - ({"meshes"} if of_archive else set()):
             if table in document:
-                raise unusable(table, "unknown key: the program reads this table from a file that the case names")
+                raise unusable(
+                    table,
+                    "unknown key: the program reads this table from a file that the case names",
+                )
         document = with_files(document, path.parent)
     if "library" not in document and path.name != FILE_NAME:
         beside = (folder or Path()) if path.parent == _HERE / "cases" else path.parent
@@ -114,20 +119,28 @@ def find_input(name: str | Path, kind: str) -> Path:
     except OSError as error:
         raise refused(shortened(text), f"cannot be read: {error.strerror}") from error
     missing = "no such file, run or sweep" if kind == "case" else "no such file"
-    raise refused(name, f"{missing}, nor a shipped {kind} ({', '.join(of_kind)}){suggestion(text, of_kind)}")
+    raise refused(
+        name, f"{missing}, nor a shipped {kind} ({', '.join(of_kind)}){suggestion(text, of_kind)}"
+    )
 
 
 def _kind_of(path: Path) -> str | None:
     """Kind of the file at a path or of a shipped name; None if unknown."""
     with suppress(OSError, InputError):
         if path.is_dir():
-            return next((file for file in ("sweep.json", "case.json") if (path / file).is_file()), None)
+            return next(
+                (file for file in ("sweep.json", "case.json") if (path / file).is_file()), None
+            )
         if path.is_file():
-            document = read_toml(path) if path.stem not in (".", "..") else {}  # refused for its name
+            document = (
+                read_toml(path) if path.stem not in (".", "..") else {}
+            )  # refused for its name
             if document.keys() & {"beads", "boundary", "drive", "liquid"}:
                 return "case"
             if document.keys() & {"materials", "liquids", "surface_pairs"}:
                 return "library"
             of_calibrations = document.keys() & {"parameters", "experiments", "observations"}
             return ("calibration" if of_calibrations else "sweep") if "case" in document else None
-    return next((kind for kind in ("case", "sweep", "calibration") if str(path) in shipped(kind)), None)
+    return next(
+        (kind for kind in ("case", "sweep", "calibration") if str(path) in shipped(kind)), None
+    )

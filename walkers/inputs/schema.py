@@ -42,7 +42,10 @@ def case_schema() -> dict[str, Any]:
     """The schema of a case file (JSON Schema 2020-12), without exclusions of keys and values of the library."""
     schema = CaseFile.model_json_schema(schema_generator=_Generator)
     schema = json.loads(_LINK.sub("", json.dumps(schema)))
-    schema["properties"]["library"] = {"type": "object", "description": "Materials and liquids of the case itself."}
+    schema["properties"]["library"] = {
+        "type": "object",
+        "description": "Materials and liquids of the case itself.",
+    }
     for table in ("Beads", "Liquid", "Contact", "Friction"):  # the library may give what they lack
         schema["$defs"][table].pop("required", None)
     return {

@@ -90,7 +90,9 @@ class Sweep:
     document: Mapping[str, Any]  # tables of the base case, changed by ``[set]``
     axes: Sequence[Axis]  # keys that vary, and their values
     rows: Sequence[tuple[Value, ...]]  # the points: one value a key
-    until_below: float | None  # speed (m/s) below which walkers are at rest on the last axis, if that is a descent
+    until_below: (
+        float | None
+    )  # speed (m/s) below which walkers are at rest on the last axis, if that is a descent
 
     @property
     def title(self) -> str:
@@ -105,7 +107,9 @@ class Sweep:
     @cached_property
     def units(self) -> dict[str, str | None]:
         """The varied keys with their units; None if one has no unit."""
-        return {key: unit for axis in self.axes for key, unit in zip(axis.keys, axis.units, strict=True)}
+        return {
+            key: unit for axis in self.axes for key, unit in zip(axis.keys, axis.units, strict=True)
+        }
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -125,7 +129,9 @@ class Sweep:
             yield case.but(title=f"{shortened(self.name)}: {shortened(text)}") if text else case
 
 
-def load_sweep(sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Value] | None = None) -> Sweep:
+def load_sweep(
+    sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Value] | None = None
+) -> Sweep:
     """Read a sweep file, a shipped sweep such as ``fig2``, or the tables of a sweep file, and expand it.
 
     ``changes`` are put beside its ``[set]``; its name tells of them. Its points are checked by `Sweep.cases`.
@@ -142,7 +148,9 @@ def load_sweep(sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Valu
     expanded = expand(document, source=source, name=name, folder=path.parent)
     if varied := {key: value for key, value in (changes or {}).items() if key in expanded.keys}:
         text = "varies in this sweep and cannot be set"
-        raise InputError(source, [Problem(key, f'"{value}"', text) for key, value in varied.items()])
+        raise InputError(
+            source, [Problem(key, f'"{value}"', text) for key, value in varied.items()]
+        )
     return expanded
 
 
@@ -180,9 +188,16 @@ def expand(
             apply_all(partial(check_key, CaseFile), (*settings, *keys))
             for key in keys:
                 for alternative in alternatives(CaseFile, key) & {*keys}:
-                    raise unusable(key, f"expected one of {key} and {alternative}, which replace each other")
+                    raise unusable(
+                        key, f"expected one of {key} and {alternative}, which replace each other"
+                    )
             case_name, given = (path.stem, read_case(path, folder)) if path else base or ("", {})
-            varied = (pair for axis in axes for row in axis.rows for pair in zip(axis.keys, row, strict=True))
+            varied = (
+                pair
+                for axis in axes
+                for row in axis.rows
+                for pair in zip(axis.keys, row, strict=True)
+            )
             given = with_files(given, folder, [*settings.items(), *varied])
             tables = changed(CaseFile, given, settings)
             changed(CaseFile, tables, dict(zip(keys, rows[0], strict=True)))
@@ -201,6 +216,10 @@ def _base(case: str, source: str, folder: Path) -> Path:
         if base.is_dir():
             raise refused(base, "expected a case file, or the name of a shipped case")
     except (OSError, InputError) as error:
-        why = error.problems[0].expected if isinstance(error, InputError) else f"cannot be read: {error.strerror}"
+        why = (
+            error.problems[0].expected
+            if isinstance(error, InputError)
+            else f"cannot be read: {error.strerror}"
+        )
         raise InputError(source, [Problem("case", f'"{case}"', why)]) from error
     return base

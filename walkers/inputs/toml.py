@@ -34,7 +34,10 @@ def read_toml(path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         actual = f"byte {error.object[error.start]:#04x} at offset {error.start}"
         raise refused(path, f"expected UTF-8 text, found {actual}") from error
-    except (ValueError, RecursionError) as error:  # TOML's own errors, integers of 5000 digits, brackets without end
+    except (
+        ValueError,
+        RecursionError,
+    ) as error:  # TOML's own errors, integers of 5000 digits, brackets without end
         raise refused(path, f"not TOML: {error}") from error
 
 

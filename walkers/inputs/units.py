@@ -16,7 +16,10 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema
-from pydantic_core.core_schema import no_info_before_validator_function, with_info_before_validator_function
+from pydantic_core.core_schema import (
+    no_info_before_validator_function,
+    with_info_before_validator_function,
+)
 
 if TYPE_CHECKING:
     from pint import UnitRegistry
@@ -25,18 +28,34 @@ ACCELERATION_OF_ONE_G = 9.8
 """m/s²; "1 g = 9.8 m/s²" in the caption of Fig. 1 of Khan et al., *Self-assembled granular walkers*."""
 
 # pint's own expression parser reads "0,3 mm" as 0 mm and "0.3 mm; 2" as 0.6 mm: only its unit parser is used.
-_NUMBER_AND_UNIT = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s%,;][^%,;]*)")
+_NUMBER_AND_UNIT = re.compile(
+    r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s%,;][^%,;]*)"
+)
 _PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[^\d\s%,;]"  # the begin of a quantity, for editors
 _GRAM_SYMBOL = re.compile(r"(?<![A-Za-z_])g(?![A-Za-z_0-9])")
 _ANGLE_UNITS = frozenset({"degree", "radian", "milliradian", "arcminute", "arcsecond"})
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
 _PREFIXED = ("m", "Hz", "m/s", "s", "rad", "N/m", "Pa*s", "Pa")
 _USUAL: Mapping[str, tuple[str, float]] = {
-    **{f"{prefix}{unit}": (unit, factor) for unit in _PREFIXED for prefix, factor in _PREFIXES.items()},
+    **{
+        f"{prefix}{unit}": (unit, factor)
+        for unit in _PREFIXED
+        for prefix, factor in _PREFIXES.items()
+    },
     **{"cm": ("m", 1e-2), "deg": ("rad", pi / 180.0)},
     **{"g": ("m/s^2", ACCELERATION_OF_ONE_G), "m/s^2": ("m/s^2", 1.0), "m/s²": ("m/s^2", 1.0)},
-    **{"kg/m^3": ("kg/m^3", 1.0), "kg/m³": ("kg/m^3", 1.0), "g/cm^3": ("kg/m^3", 1e3), "g/cm³": ("kg/m^3", 1e3)},
-    **{"m^2/s": ("m^2/s", 1.0), "m²/s": ("m^2/s", 1.0), "mm^2/s": ("m^2/s", 1e-6), "mm²/s": ("m^2/s", 1e-6)},
+    **{
+        "kg/m^3": ("kg/m^3", 1.0),
+        "kg/m³": ("kg/m^3", 1.0),
+        "g/cm^3": ("kg/m^3", 1e3),
+        "g/cm³": ("kg/m^3", 1e3),
+    },
+    **{
+        "m^2/s": ("m^2/s", 1.0),
+        "m²/s": ("m^2/s", 1.0),
+        "mm^2/s": ("m^2/s", 1e-6),
+        "mm²/s": ("m^2/s", 1e-6),
+    },
 }
 """Usual units in SI units, as in pint; cases with only these units do not import pint."""
 _ZEROS: Mapping[str, float] = {"K": 0.0, "degC": 273.15, "°C": 273.15}
@@ -64,12 +83,21 @@ class Kind:
         article = "an" if self.name[0] in "aeiou" else "a"
         return f'expected {article} {self.name} with its unit, such as "{self.example}"'
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
         return with_info_before_validator_function(self._read, handler(source))
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
         """A text with a unit, for editors that check case files."""
-        return {"type": "string", "pattern": _PATTERN, "description": self.expectation, "examples": [self.example]}
+        return {
+            "type": "string",
+            "pattern": _PATTERN,
+            "description": self.expectation,
+            "examples": [self.example],
+        }
 
     def _read(self, value: object, validation: ValidationInfo) -> object:
         if not isinstance(value, str):
@@ -96,7 +124,10 @@ def parse_quantity(text: str, kind: Kind) -> float:
     # Rounded: 4.0 g/cm³ is 4000 kg/m³, not 3999.9999999999995.
     value = float(f"{float(match['number']) * factor + zero:.15g}")
     if value != 0.0 and not kind.smallest <= abs(value) <= kind.largest:
-        low, high = (f"{float(f'{(bound - zero) / factor:.4g}'):g}" for bound in (kind.smallest, kind.largest))
+        low, high = (
+            f"{float(f'{(bound - zero) / factor:.4g}'):g}"
+            for bound in (kind.smallest, kind.largest)
+        )
         raise ValueError(f"{kind.expectation}; it must lie between {low} and {high} {symbol}")
     return value
 
@@ -121,10 +152,14 @@ def _by_pint(symbol: str, kind: Kind) -> float:
         raise ValueError(kind.expectation)
     units = _registry()
     try:
-        unit = units.parse_units(_GRAM_SYMBOL.sub("gee", symbol) if kind.unit == ACCELERATION.unit else symbol)
+        unit = units.parse_units(
+            _GRAM_SYMBOL.sub("gee", symbol) if kind.unit == ACCELERATION.unit else symbol
+        )
         factor = float(units.Quantity(1.0, unit).to(kind.unit).magnitude)
         root = str(units.Quantity(1.0, unit).to_root_units().units)
-    except Exception as error:  # pint's parser raises a dozen types, the tokenizer's errors among them
+    except (
+        Exception
+    ) as error:  # pint's parser raises a dozen types, the tokenizer's errors among them
         raise ValueError(kind.expectation) from error
     # Pint treats radians as pure numbers.
     if kind.unit == ANGLE.unit and str(unit) not in _ANGLE_UNITS:
@@ -140,7 +175,9 @@ def as_quantity(value: Any) -> tuple[float, str | None] | None:
     if not match and (isinstance(value, bool) or not isinstance(value, (int, float))):
         return None
     with suppress(OverflowError):  # an integer of hundreds of digits
-        number, unit = (float(match["number"]), match["unit"].strip()) if match else (float(value), None)
+        number, unit = (
+            (float(match["number"]), match["unit"].strip()) if match else (float(value), None)
+        )
         return (number, unit) if isfinite(number) else None
     return None
 
@@ -154,7 +191,9 @@ def quantity_text(value: float, kind: Kind) -> str:
 def kind_in(annotations: Iterable[Any]) -> Kind | None:
     """The kind of quantity that a field of a table holds, by its metadata and annotation; or None."""
     for annotation in annotations:
-        if (kind := annotation if isinstance(annotation, Kind) else kind_in(get_args(annotation))) is not None:
+        if (
+            kind := annotation if isinstance(annotation, Kind) else kind_in(get_args(annotation))
+        ) is not None:
             return kind
     return None
 
@@ -206,10 +245,16 @@ def is_auto(value: object) -> bool:
 class _Auto:
     """Reads "auto" as None."""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return no_info_before_validator_function(lambda value: None if is_auto(value) else value, handler(source))
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return no_info_before_validator_function(
+            lambda value: None if is_auto(value) else value, handler(source)
+        )
 
-    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
         return {"anyOf": [handler(schema), {"const": "auto"}]}
 
 

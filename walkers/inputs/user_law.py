@@ -31,9 +31,13 @@ def _curve(law: BridgeLaw, surfaces: Surfaces) -> Curve:
     """The curve of a law; `UnusableLawError` if it, or its forces, cannot be used, or it reaches beyond `_FARTHEST`."""
     given = _called(law, surfaces)
     if not isinstance(given, Curve):
-        raise UnusableLawError(f"returns {type(given).__name__}; expected walkers.physics.bridge.Curve")
+        raise UnusableLawError(
+            f"returns {type(given).__name__}; expected walkers.physics.bridge.Curve"
+        )
     if given.rupture > (farthest := _FARTHEST * surfaces.radius):
-        raise UnusableLawError(f"the bridge breaks at a gap of {given.rupture:g} m; expected at most {farthest:g} m")
+        raise UnusableLawError(
+            f"the bridge breaks at a gap of {given.rupture:g} m; expected at most {farthest:g} m"
+        )
 
     def forces(gaps: FloatArray) -> Forces:
         return Forces(*_called(columns_at, given, gaps).T)

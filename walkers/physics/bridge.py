@@ -59,10 +59,14 @@ class Surfaces:
     other_radius: float  #: of the other bead, infinite for a plane, m
     volume: float  #: of the bridge, m³
     liquid: BridgeLiquid
-    roughness: float  #: gap that remains for the liquid between surfaces that touch at their asperities, m
+    roughness: (
+        float  #: gap that remains for the liquid between surfaces that touch at their asperities, m
+    )
 
     @classmethod
-    def of(cls, radius: float, other_radius: float, liquid: BridgeLiquid, roughness: Roughness) -> Surfaces:
+    def of(
+        cls, radius: float, other_radius: float, liquid: BridgeLiquid, roughness: Roughness
+    ) -> Surfaces:
         """Make the surfaces of a bead and another bead or a plane (infinite radius), and the volume of their bridge."""
         small, large = sorted((radius, other_radius))
         rough = roughness.bead_wall if large == inf else roughness.bead_bead
@@ -83,7 +87,10 @@ class Surfaces:
         """What each surface contributes to a bridge of full films, and its liquid, m³ (a wall has none)."""
         fraction, small, large = self.liquid.volume_fraction, self.radius, self.other_radius
         shares = share_of_bead(small, large, fraction), share_of_bead(large, small, fraction)
-        return shares, (film_volume(small, fraction), inf if self.at_wall else film_volume(large, fraction))
+        return shares, (
+            film_volume(small, fraction),
+            inf if self.at_wall else film_volume(large, fraction),
+        )
 
     @property
     def at_wall(self) -> bool:
@@ -93,7 +100,11 @@ class Surfaces:
     @property
     def reduced_radius(self) -> float:
         """Reduced radius R1 R2/(R1 + R2); at a plane, the radius of the bead; m."""
-        return self.radius if self.at_wall else self.radius * self.other_radius / (self.radius + self.other_radius)
+        return (
+            self.radius
+            if self.at_wall
+            else self.radius * self.other_radius / (self.radius + self.other_radius)
+        )
 
 
 @dataclass(frozen=True)
@@ -119,17 +130,23 @@ class Curve:
     rupture: float  #: gap at which the bridge breaks, m
     formation: float = 0.0  #: gap below which it forms, m; 0: the surfaces must touch
     scale: float = 0.0  #: gap over which forces vary near contact, where a kink may be, m; 0: `Surfaces.roughness`
-    pull: Callable[[FloatArray], FloatArray] | None = None  #: alone, N, if resistances are expensive to compute
+    pull: Callable[[FloatArray], FloatArray] | None = (
+        None  #: alone, N, if resistances are expensive to compute
+    )
 
     def __post_init__(self) -> None:
         """Refuse gaps that are not in their order."""
         if not 0.0 < self.rupture < inf:
-            raise UnusableLawError(f"the bridge breaks at a gap of {self.rupture:g} m; expected a positive number")
+            raise UnusableLawError(
+                f"the bridge breaks at a gap of {self.rupture:g} m; expected a positive number"
+            )
         if not 0.0 <= self.formation <= self.rupture:
             expected = f"expected 0 to its rupture, {self.rupture:g} m"
             raise UnusableLawError(f"the bridge forms at a gap of {self.formation:g} m; {expected}")
         if not 0.0 <= self.scale < inf:
-            raise UnusableLawError(f"its forces vary over a gap of {self.scale:g} m; expected zero or more (scale)")
+            raise UnusableLawError(
+                f"its forces vary over a gap of {self.scale:g} m; expected zero or more (scale)"
+            )
 
 
 def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
@@ -137,7 +154,9 @@ def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
     with np.errstate(all="ignore"):
         forces = curve.forces(gaps)
     if not isinstance(forces, Forces):
-        raise UnusableLawError(f"its forces are {type(forces).__name__}; expected walkers.physics.bridge.Forces")
+        raise UnusableLawError(
+            f"its forces are {type(forces).__name__}; expected walkers.physics.bridge.Forces"
+        )
     columns = np.empty((len(gaps), len(_COLUMNS)))
     for number, (name, given) in enumerate(zip(_COLUMNS, vars(forces).values(), strict=True)):
         column = np.asarray(given)
@@ -146,9 +165,13 @@ def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
             raise UnusableLawError(f"the {name} has {kind}; expected real numbers (n,)")
         columns[:, number] = column
         if not np.isfinite(column := columns[:, number]).all():
-            raise UnusableLawError(f"the {name} is not a number at a gap of {gaps[~np.isfinite(column)][0]:g} m")
+            raise UnusableLawError(
+                f"the {name} is not a number at a gap of {gaps[~np.isfinite(column)][0]:g} m"
+            )
         if name.endswith("resistance") and (column < 0.0).any():
-            raise UnusableLawError(f"the {name} is negative at a gap of {gaps[column < 0.0][0]:g} m")
+            raise UnusableLawError(
+                f"the {name} is negative at a gap of {gaps[column < 0.0][0]:g} m"
+            )
     _, _, sliding, coupling, rolling = columns.T
     gains = coupling**2 > (1.0 + 1e-9) * sliding * rolling
     if gains.any():

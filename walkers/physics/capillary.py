@@ -61,7 +61,9 @@ def bridge_volume(radius: float, other_radius: float, liquid: BridgeLiquid) -> f
         place = place_of_numbers("menisci", solver() + repr(shape).encode())
         return float(kept_numbers(place, lambda: _volume_by_suction(*shape))[0])
     fraction = liquid.volume_fraction
-    return share_of_bead(radius, other_radius, fraction) + share_of_bead(other_radius, radius, fraction)
+    return share_of_bead(radius, other_radius, fraction) + share_of_bead(
+        other_radius, radius, fraction
+    )
 
 
 def _volume_by_suction(*shape: float) -> FloatArray:
@@ -97,7 +99,11 @@ def share_of_bead(radius: float, other_radius: float, volume_fraction: float) ->
     """
     if radius == inf:
         return 0.0
-    cap = 1.0 if other_radius == inf else 1.0 - sqrt(1.0 - (other_radius / (radius + other_radius)) ** 2)
+    cap = (
+        1.0
+        if other_radius == inf
+        else 1.0 - sqrt(1.0 - (other_radius / (radius + other_radius)) ** 2)
+    )
     return 0.5 * film_volume(radius, volume_fraction) * cap
 
 

@@ -49,7 +49,9 @@ class Impact(NamedTuple):
 
     def depth(self, speed: float) -> float:
         """Largest overlap, m."""
-        return float((15.0 * self.mass * speed**2 / (16.0 * self.modulus * sqrt(self.radius))) ** 0.4)
+        return float(
+            (15.0 * self.mass * speed**2 / (16.0 * self.modulus * sqrt(self.radius))) ** 0.4
+        )
 
     def peak_force(self, speed: float) -> float:
         """Largest force, N."""

@@ -105,7 +105,9 @@ class _Trigonometry:
         halves = 0.5 * angles
         sines, cosines = sine_and_cosine(halves)
         tiny = np.abs(halves) < 1e-4
-        half_sincs = np.where(tiny, 1.0 - halves * halves / 6.0, sines / np.where(tiny, 1.0, halves))
+        half_sincs = np.where(
+            tiny, 1.0 - halves * halves / 6.0, sines / np.where(tiny, 1.0, halves)
+        )
         sincs = half_sincs * cosines
         whole_cosines = 1.0 - 2.0 * sines * sines
         return cls(
@@ -194,7 +196,9 @@ class _Family:
         # The angle of the profile is π - θ1 - α1 at the first solid and θ2 + α2 at the second one.
         contact_sines, contact_cosines = self.contact
         sines = contact_sines * trigonometry.cosines + _AWAY * contact_cosines * trigonometry.sines
-        cosines = contact_cosines * trigonometry.cosines - _AWAY * contact_sines * trigonometry.sines
+        cosines = (
+            contact_cosines * trigonometry.cosines - _AWAY * contact_sines * trigonometry.sines
+        )
         turning = _AWAY * curvatures
         return _Solids(
             radii=radii,
@@ -229,19 +233,27 @@ class _Family:
         swing = along * on_profile.sincs
         swing_by_pressure = along * along * on_profile.sinc_slopes
         lift = (along * on_profile.half_sincs) ** 2
-        lift_by_pressure = along * along * along * on_profile.half_sincs * on_profile.half_sinc_slopes
+        lift_by_pressure = (
+            along * along * along * on_profile.half_sincs * on_profile.half_sinc_slopes
+        )
         bend = 1.0 - pressure * upright
         bend_by_arc = -pressure * upright_by_arc
 
         # r² = r0² + bend · lift + 2 r0 cos φ0 · swing, and r sin φ = r0 sin φ0 + p (r² - r0²)/2.
         grown = bend * lift + 2.0 * outward * swing
         grown_by_arc = bend_by_arc * lift + 2.0 * outward_by_arc * swing
-        grown_by_pressure = -upright * lift + bend * lift_by_pressure + 2.0 * outward * swing_by_pressure
+        grown_by_pressure = (
+            -upright * lift + bend * lift_by_pressure + 2.0 * outward * swing_by_pressure
+        )
         # r cos φ is half the derivative of r² with respect to s.
         outwards = outward * on_profile.cosines + bend * swing
         outwards_by_arc = outward_by_arc * on_profile.cosines + bend_by_arc * swing
-        outwards_by_pressure = -outward * on_profile.sines * along - upright * swing + bend * swing_by_pressure
-        outwards_by_length = (-outward * on_profile.sines * pressure + bend * on_profile.cosines) * _PLACES
+        outwards_by_pressure = (
+            -outward * on_profile.sines * along - upright * swing + bend * swing_by_pressure
+        )
+        outwards_by_length = (
+            -outward * on_profile.sines * pressure + bend * on_profile.cosines
+        ) * _PLACES
         grown_by_length = 2.0 * outwards * _PLACES
         return _Profile(
             solids=solids,
@@ -257,7 +269,9 @@ class _Family:
                 0.5 * grown + 0.5 * pressure * grown_by_pressure,
                 0.5 * pressure * grown_by_length,
             ),
-            outwards=_WithSlopes(outwards, outwards_by_arc, outwards_by_pressure, outwards_by_length),
+            outwards=_WithSlopes(
+                outwards, outwards_by_arc, outwards_by_pressure, outwards_by_length
+            ),
         )
 
     def misfit(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -324,7 +338,9 @@ class _Family:
             change = np.abs(step[:, _POSITIVE] / x[:, _POSITIVE]).max(axis=1)
             x = x - step * np.minimum(1.0, 0.3 / (change + 1e-300))[:, None]
             sound = (x[:, _POSITIVE] > 0.0).all(axis=1)
-            good = sound & (np.abs(step).max(axis=1) < _CONVERGED * np.maximum(1.0, np.abs(x).max(axis=1)))
+            good = sound & (
+                np.abs(step).max(axis=1) < _CONVERGED * np.maximum(1.0, np.abs(x).max(axis=1))
+            )
             solved[left[good]] = x[good]
             sound &= ~good
             if not sound.any():
@@ -371,16 +387,22 @@ def _toroid(family: _Family) -> FloatArray:
     curvatures = np.array(family.curvatures)
     slopes = curvatures * arc
     height = float((0.5 * slopes * arc * _Trigonometry.of(slopes).half_sincs ** 2).sum())
-    angles = [angle + float(slope) for angle, slope in zip(family.contact_angles, slopes, strict=True)]
+    angles = [
+        angle + float(slope) for angle, slope in zip(family.contact_angles, slopes, strict=True)
+    ]
     turn = 0.5 * (pi - sum(angles))
     length = height / float(_Trigonometry.of(np.array(turn)).sincs)
     return np.array([*arc, 1.0 / arc[0] - 2.0 * float(sine(turn)) / height, length, 0.0])
 
 
-def _family_of(radii: tuple[float, float], volume: float, contact_angle: float | tuple[float, float]) -> _Family:
+def _family_of(
+    radii: tuple[float, float], volume: float, contact_angle: float | tuple[float, float]
+) -> _Family:
     """The family of bridges, lengths in units of the volume's cube root."""
     if volume <= 0.0 or min(radii) <= 0.0 or not volume < inf or min(radii) == inf:
-        raise ValueError(f"radii {radii}, volume {volume}: expected positive numbers, and a plane at one side at most")
+        raise ValueError(
+            f"radii {radii}, volume {volume}: expected positive numbers, and a plane at one side at most"
+        )
     angles = contact_angle if isinstance(contact_angle, tuple) else (contact_angle, contact_angle)
     if not all(0.0 <= angle < pi for angle in angles):
         raise ValueError(f"contact angles {angles}: expected 0 to π")
@@ -473,7 +495,9 @@ def force_curve(
     if scaled.min() < 0.0 or scaled.max() > largest * (1.0 + 1e-12):
         raise ValueError(f"gaps: expected 0 to {largest * unit:.6g}, where the bridge ruptures")
     bridges = _stable(family, np.minimum(scaled, largest))
-    return ForceCurve(unit * family.forces(bridges), bridges[:, :4] * [unit, unit, 1.0 / unit, unit])
+    return ForceCurve(
+        unit * family.forces(bridges), bridges[:, :4] * [unit, unit, 1.0 / unit, unit]
+    )
 
 
 def _stable(family: _Family, gaps: FloatArray) -> FloatArray:
@@ -489,17 +513,26 @@ def _stable(family: _Family, gaps: FloatArray) -> FloatArray:
 
     of_gaps, inside = cubics[:, :, 4].T.tolist(), (knots[pieces] < gaps) & (gaps < knots[-1])
     # At its left end a piece may begin above the gap by rounding.
-    arcs = [brentq(ahead, lows[i], highs[i], (i,)) if inside[i] else lows[i] for i in range(len(gaps))]
+    arcs = [
+        brentq(ahead, lows[i], highs[i], (i,)) if inside[i] else lows[i] for i in range(len(gaps))
+    ]
     near = _cubic(cubics, (np.array(arcs) - lows)[:, None])
     bridges = family.solve(near, _GAP, gaps)
     bridges[gaps >= knots[-1]] = branch[-1]
     far = ~(np.max(np.abs(bridges - near)[:, _POSITIVE], axis=1) <= _NEAR) & (gaps < knots[-1])
     for number in np.flatnonzero(far):
         chord = branch[pieces[number] + 1] - branch[pieces[number]]
-        bridges[number] = _across(family, cubics[:, number], chord, (lows[number], highs[number]), gaps[number])
-    lost = ~(np.maximum(np.abs(bridges[:, 4] - gaps), np.max(np.abs(family.misfit(bridges)[0]), axis=1)) <= _SAME_GAP)
+        bridges[number] = _across(
+            family, cubics[:, number], chord, (lows[number], highs[number]), gaps[number]
+        )
+    lost = ~(
+        np.maximum(np.abs(bridges[:, 4] - gaps), np.max(np.abs(family.misfit(bridges)[0]), axis=1))
+        <= _SAME_GAP
+    )
     if lost.any():
-        raise NoBridgeError(f"no bridge was found at a gap of {gaps[lost][0]:.6g} of the volume's cube root")
+        raise NoBridgeError(
+            f"no bridge was found at a gap of {gaps[lost][0]:.6g} of the volume's cube root"
+        )
     return bridges
 
 
@@ -509,7 +542,9 @@ def _cubic(coefficients: Any, x: Any) -> Any:
     return last + third * x + second * (x * x) + first * (x * x * x)
 
 
-def _across(family: _Family, cubic: FloatArray, chord: FloatArray, ends: tuple[float, float], gap: float) -> FloatArray:
+def _across(
+    family: _Family, cubic: FloatArray, chord: FloatArray, ends: tuple[float, float], gap: float
+) -> FloatArray:
     """The bridge at a gap near the largest one, where it depends strongly on the gap: sought along the family."""
 
     def at(arc: float) -> FloatArray:
@@ -518,17 +553,25 @@ def _across(family: _Family, cubic: FloatArray, chord: FloatArray, ends: tuple[f
         return near if exact is None else exact
 
     last = at(ends[1])
-    return last if last[4] <= gap else at(float(brentq(lambda arc: at(arc)[4] - gap, *ends, xtol=1e-12)))
+    return (
+        last
+        if last[4] <= gap
+        else at(float(brentq(lambda arc: at(arc)[4] - gap, *ends, xtol=1e-12)))
+    )
 
 
 def rupture_distance(
     radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float]
 ) -> float:
     """Largest gap at which a bridge of this volume exists; parameters and errors as for `force_curve`."""
-    return cube_root(volume) * float(_branch(_family_of((radius_1, radius_2), volume, contact_angle))[1][-1, 4])
+    return cube_root(volume) * float(
+        _branch(_family_of((radius_1, radius_2), volume, contact_angle))[1][-1, 4]
+    )
 
 
-def volume_at_contact(radius_1: float, radius_2: float, contact_angle: float, meniscus_radius: float) -> float:
+def volume_at_contact(
+    radius_1: float, radius_2: float, contact_angle: float, meniscus_radius: float
+) -> float:
     """Volume of a bridge between touching solids whose pressure is that of the air minus γ/``meniscus_radius``.
 
     Parameters as for `force_curve`. `NoBridgeError` if bridges up to half of the smaller sphere have more suction, or
@@ -541,7 +584,9 @@ def volume_at_contact(radius_1: float, radius_2: float, contact_angle: float, me
     def missing(log_volume: float) -> float:
         """Suction that is missing, over the wanted one."""
         volume = float(exponential(log_volume))
-        pressure = _touching(_family_of((radius_1, radius_2), volume, contact_angle))[2] / cube_root(volume)
+        pressure = _touching(_family_of((radius_1, radius_2), volume, contact_angle))[
+            2
+        ] / cube_root(volume)
         return float(1.0 + pressure * meniscus_radius)
 
     if not missing(ends[0]) < 0.0 < missing(ends[1]):

@@ -90,7 +90,9 @@ def sine_and_cosine(angles: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     swapped = (quadrant == 1.0) | (quadrant == 3.0)
     sine_sign = np.where(quadrant >= 2.0, -1.0, 1.0)
     cosine_sign = np.where((quadrant == 1.0) | (quadrant == 2.0), -1.0, 1.0)
-    return sine_sign * np.where(swapped, cosine, sine), cosine_sign * np.where(swapped, sine, cosine)
+    return sine_sign * np.where(swapped, cosine, sine), cosine_sign * np.where(
+        swapped, sine, cosine
+    )
 
 
 def sine(angles: npt.ArrayLike) -> FloatArray:

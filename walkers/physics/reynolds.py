@@ -84,13 +84,17 @@ def curve(surfaces: Surfaces, pull: Callable[[FloatArray], FloatArray], rupture:
     return Curve(forces, rupture, pull=pulled)
 
 
-def resistances(surfaces: Surfaces, gaps: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+def resistances(
+    surfaces: Surfaces, gaps: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """N and S (N s/m), C (N s), Q (N m s) of a bridge at gaps, m, each of shape (n,)."""
     viscosity, reduced = surfaces.liquid.viscosity, surfaces.reduced_radius
     liquid_gaps = np.maximum(gaps, 0.0) + surfaces.roughness
     wide = liquid_gaps + cavitation_gap(surfaces.liquid)
     spread = surfaces.volume / (pi * reduced)
-    normal = 6.0 * pi * viscosity * reduced**2 / wide * (1.0 - wide / np.sqrt(wide**2 + spread)) ** 2
+    normal = (
+        6.0 * pi * viscosity * reduced**2 / wide * (1.0 - wide / np.sqrt(wide**2 + spread)) ** 2
+    )
     deep = np.sqrt(liquid_gaps**2 + spread) / liquid_gaps - 1.0  # y
     bend = 0.5 * (1.0 / surfaces.radius - 1.0 / surfaces.other_radius)
     tilting = 96.0 * pi * viscosity * (reduced * reduced * reduced) * _tilted(deep)
@@ -128,7 +132,9 @@ def _logarithmic_slope(deep: FloatArray) -> FloatArray:
     far = np.minimum(rest, 0.5)
     scale = _SECOND * power(far, _EXPONENT)
     second = scale * polynomial(_FAR_SECOND, far)
-    second_slope = scale * (_EXPONENT / far * polynomial(_FAR_SECOND, far) + polynomial(_slopes(_FAR_SECOND), far))
+    second_slope = scale * (
+        _EXPONENT / far * polynomial(_FAR_SECOND, far) + polynomial(_slopes(_FAR_SECOND), far)
+    )
     far_series = polynomial(_FAR_FIRST, far) + second
     far_slope = -(polynomial(_slopes(_FAR_FIRST), far) + second_slope)
     of_logarithm = np.where(w <= 0.5, slope / series, far_slope / far_series)

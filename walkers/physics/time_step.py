@@ -54,9 +54,14 @@ class TimeStepLimits:
     def recommended(self, *, loose: bool) -> tuple[float, str]:
         """Largest step (s) within the shares of all limits, for loose beads or walkers; and the lowest limit."""
         shares = FRACTIONS[loose]
-        steps = [(shares[name] * at, f"{shares[name]:g} of the {name} limit") for name, at in vars(self).items()]
+        steps = [
+            (shares[name] * at, f"{shares[name]:g} of the {name} limit")
+            for name, at in vars(self).items()
+        ]
         longest = LONGEST_WALKER_STEP
-        return min(steps if loose else [*steps, (longest, f"at most {longest * 1e6:g} us for walkers")])
+        return min(
+            steps if loose else [*steps, (longest, f"at most {longest * 1e6:g} us for walkers")]
+        )
 
     def exceeded_by(self, time_step: float) -> list[str]:
         """Names of the limits below ``time_step`` (s)."""
@@ -88,21 +93,29 @@ def time_step_limits(
         impacts.append((mass, radius))
         rates.append(walls * drag(radius, roughness.bead_wall) / mass)
         for neighbour in neighbours:
-            neighbour_mass, reduced = bead_volume(neighbour) * density, radius * neighbour / (radius + neighbour)
+            neighbour_mass, reduced = (
+                bead_volume(neighbour) * density,
+                radius * neighbour / (radius + neighbour),
+            )
             impacts.append((mass * neighbour_mass / (mass + neighbour_mass), reduced))
             rates[-1] += drag(reduced, roughness.bead_bead) * (1.0 / mass + 1.0 / neighbour_mass)
     shear_modulus = youngs_modulus / (2.0 * (1.0 + poissons_ratio))
     slowest = pi * min(radius for radius, *_ in bridged) * sqrt(density / shear_modulus)
     return TimeStepLimits(
         rayleigh=slowest / (0.1631 * poissons_ratio + 0.8766),
-        hertz=min(2.87 * float((mass**2 / (radius * modulus**2 * peak_velocity)) ** 0.2) for mass, radius in impacts)
+        hertz=min(
+            2.87 * float((mass**2 / (radius * modulus**2 * peak_velocity)) ** 0.2)
+            for mass, radius in impacts
+        )
         if peak_velocity
         else inf,
         viscous=2.0 / max(rates) if max(rates) > 0.0 else inf,
     )
 
 
-def fit_into_cycle(largest_time_step: float, frequency: float, samples_per_cycle: int) -> tuple[float, int]:
+def fit_into_cycle(
+    largest_time_step: float, frequency: float, samples_per_cycle: int
+) -> tuple[float, int]:
     """Largest step (s) up to the given one that divides the cycle and each sampling interval into whole steps.
 
     Samples that drift through the phase (every 312 of 6250 steps) change a mean velocity by 3 %. Returns the step and

@@ -53,7 +53,9 @@ def _sha256(path: Path, _modified: int, _size: int) -> str:
 @lru_cache(maxsize=8)
 def _parts_of(path: Path, _modified: int) -> tuple[Path, ...]:
     """An executable and the ``libliggghts`` that it loads (Debian's executable is only a launcher of 18 kB)."""
-    listing = subprocess.run(["ldd", str(path)], capture_output=True, text=True, errors="replace", check=False).stdout
+    listing = subprocess.run(
+        ["ldd", str(path)], capture_output=True, text=True, errors="replace", check=False
+    ).stdout
     return path, *(Path(match) for match in _LIBRARY.findall(listing))
 
 
@@ -67,7 +69,10 @@ def version_in(output: bytes) -> str | None:
 def check_version(engine: Engine) -> None:
     """Refuse a binary that contains another version; if it contains none, the banner is checked later."""
     for part in _parts_of(engine.path, engine.path.stat().st_mtime_ns):
-        with part.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as contents:
+        with (
+            part.open("rb") as file,
+            mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as contents,
+        ):
             version = match[0].decode() if (match := _VERSION.search(contents)) else AUDITED_VERSION
         if version != AUDITED_VERSION:
             raise OtherEngine(engine.path, version)

@@ -29,7 +29,15 @@ _HEADERS = Path("/usr/include/liggghts")
 # operations. (The C library's sine, of the drive, differs in its last digit without fused multiply-add.) Only without
 # traps does it compute several contacts at once.
 _OPTIONS = (
-    *("-shared", "-fPIC", "-std=gnu++11", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math"),
+    *(
+        "-shared",
+        "-fPIC",
+        "-std=gnu++11",
+        "-O3",
+        "-ffp-contract=off",
+        "-fno-math-errno",
+        "-fno-trapping-math",
+    ),
     *("-DNDEBUG", "-DOMPI_SKIP_MPICXX", "-Wall", "-Wextra"),
 )
 _LINKED = ("-Wl,-Bsymbolic", "-l:libliggghts.so.3")
@@ -39,7 +47,9 @@ def plugin_of(engine: Engine) -> Path:
     """The contact model for an engine, compiled on first use; raises `OtherEngine` or `ContactModelMissing`."""
     place, fingerprint = _place()
     if set(str(place)) & set(": "):
-        raise ContactModelMissing(f"{place} has a space or a colon, which the system's loader takes for a separator")
+        raise ContactModelMissing(
+            f"{place} has a space or a colon, which the system's loader takes for a separator"
+        )
     check_version(engine)
     try:
         secure_cache()
@@ -80,8 +90,12 @@ def _place() -> tuple[Path, str]:
     fingerprint = hashlib.sha256("\0".join(_OPTIONS).encode())
     for source in model_sources.compiled_sources():
         fingerprint.update(source.read_bytes())
-    for library in sorted(Path("/usr/lib").glob("*/libliggghts.so.3")):  # another file after an upgrade
-        fingerprint.update(f"{library.resolve()} {library.stat().st_mtime_ns} {library.stat().st_size}".encode())
+    for library in sorted(
+        Path("/usr/lib").glob("*/libliggghts.so.3")
+    ):  # another file after an upgrade
+        fingerprint.update(
+            f"{library.resolve()} {library.stat().st_mtime_ns} {library.stat().st_size}".encode()
+        )
     return cache_folder() / f"bridge-{fingerprint.hexdigest()[:16]}.so", fingerprint.hexdigest()
 
 
@@ -89,7 +103,9 @@ def _is_as_compiled(place: Path, fingerprint: str) -> bool:
     """Whether a compiled model agrees with its record, and no other user can write the two."""
     record = place.with_suffix(".json")
     with suppress(OSError, ValueError):
-        return is_safe(place) and is_safe(record) and read_json(record) == _record(place, fingerprint)
+        return (
+            is_safe(place) and is_safe(record) and read_json(record) == _record(place, fingerprint)
+        )
     return False
 
 
@@ -101,15 +117,33 @@ def _compile(place: Path, fingerprint: str) -> None:
     """Compile the model, and write its checksum and the fingerprint of its sources beside it."""
     compiler, mpi = shutil.which("g++"), shutil.which("mpicxx")
     if compiler is None or mpi is None or not _HEADERS.is_dir():
-        raise ContactModelMissing(f"it is compiled once; install what that needs: apt-get install {_PACKAGES}")
-    mpi_folders = subprocess.run([mpi, "--showme:incdirs"], capture_output=True, text=True, check=False)
-    included = [option for folder in (str(_HEADERS), *mpi_folders.stdout.split()) for option in ("-isystem", folder)]
+        raise ContactModelMissing(
+            f"it is compiled once; install what that needs: apt-get install {_PACKAGES}"
+        )
+    mpi_folders = subprocess.run(
+        [mpi, "--showme:incdirs"], capture_output=True, text=True, check=False
+    )
+    included = [
+        option
+        for folder in (str(_HEADERS), *mpi_folders.stdout.split())
+        for option in ("-isystem", folder)
+    ]
     linked = [f"-Wl,--version-script={model_sources.SOURCES / 'bridge.map'}", *_LINKED]
     with tempfile.TemporaryDirectory(dir=make_cache_folder()) as folder:
         library = Path(folder) / place.name
         source = model_sources.SOURCES / model_sources.MODEL
-        command = [compiler, *_OPTIONS, f"-I{source.parent}", *included, str(source), "-o", str(library)]
-        done = subprocess.run([*command, *linked], capture_output=True, text=True, errors="replace", check=False)
+        command = [
+            compiler,
+            *_OPTIONS,
+            f"-I{source.parent}",
+            *included,
+            str(source),
+            "-o",
+            str(library),
+        ]
+        done = subprocess.run(
+            [*command, *linked], capture_output=True, text=True, errors="replace", check=False
+        )
         if done.returncode:
             error = next((line for line in done.stderr.splitlines() if "error" in line), "nothing")
             raise ContactModelMissing(f"the compiler says: {error}")
@@ -126,7 +160,9 @@ def write_run_script(directory: Path, engine: Engine, plugin: Path, ranks: int) 
     parallel = f"mpirun -n {ranks} " if ranks > 1 else ""
     command = f"{parallel}env LD_PRELOAD={shlex.quote(str(plugin))} {shlex.quote(str(engine.path))} -in {DECK_NAME}"
     about = f'# Runs {DECK_NAME} with the contact model "cohesion bridge", which is loaded into the engine.'
-    (directory / RUN_NAME).write_text(f"{about}\nexec {command} > {OUTPUT_NAME}\n", encoding="utf-8")
+    (directory / RUN_NAME).write_text(
+        f"{about}\nexec {command} > {OUTPUT_NAME}\n", encoding="utf-8"
+    )
 
 
 def compile_model() -> None:

@@ -44,17 +44,23 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
     run = case.run
     cycles = sum(share * cycles for share, cycles in zip(_TRIED_AGAIN, run.attempts, strict=False))
     segments = ceil(run.cycles / run.cycles_per_segment) + (RESTING_SEGMENTS if run.rests else 0)
-    steps = cycles * run.steps_per_cycle + (RESTING_SEGMENTS * settling_steps(case) if run.rests else 0)
+    steps = cycles * run.steps_per_cycle + (
+        RESTING_SEGMENTS * settling_steps(case) if run.rests else 0
+    )
     count = pairs_of_beads(case) if walkers is None else walkers
     if case.loose:
         seconds_a_step = _PILE_MICROSECONDS * 1e-6
-        seconds_a_step += case.count / (_BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1)))
+        seconds_a_step += case.count / (
+            _BEAD_STEPS_PER_SECOND * (1.0 + _GAIN_PER_RANK * (run.ranks - 1))
+        )
     else:
         seconds_a_step = (_STEP_MICROSECONDS + _WALKER_MICROSECONDS * count) * 1e-6
     start_up = START_UP_SECONDS
     if case.boundary.triangles:
         beads = case.count if walkers is None else 2 * walkers
-        seconds_a_step += beads * _seconds_at_facets(case) / (1.0 + _GAIN_PER_RANK * (run.ranks - 1))
+        seconds_a_step += (
+            beads * _seconds_at_facets(case) / (1.0 + _GAIN_PER_RANK * (run.ranks - 1))
+        )
         start_up += _FACET_START_UP_SECONDS * len(case.boundary.walls)
     return start_up * segments + steps * seconds_a_step
 
@@ -72,7 +78,10 @@ def predicted_overhead(cases: Iterable[Case]) -> float:
     from walkers.physics.laws.young_laplace import unsolved
 
     cases = list(cases)
-    kinds = {(case.liquid.of_bridges, case.contact.roughness, tuple(sorted(set(case.radii)))) for case in cases}
+    kinds = {
+        (case.liquid.of_bridges, case.contact.roughness, tuple(sorted(set(case.radii))))
+        for case in cases
+    }
     bridges = [
         bridge
         for liquid, roughness, radii in kinds

@@ -34,7 +34,15 @@ from walkers.physics.laws import LAWS
 from walkers.runner.binary import Engine
 from walkers.runner.failures import DiskFull, FileTooLarge, OutputGone, RunBusy
 from walkers.runner.launch import EngineReport
-from walkers.runner.manifest import FORMAT, MANIFEST_NAME, check_unchanged, checksums, iso_time, read_manifest, sums_of
+from walkers.runner.manifest import (
+    FORMAT,
+    MANIFEST_NAME,
+    check_unchanged,
+    checksums,
+    iso_time,
+    read_manifest,
+    sums_of,
+)
 from walkers.runner.provenance import software
 from walkers.templates.deck import (
     BRIDGES_NAME,
@@ -73,11 +81,23 @@ def run_place(case: Case, engine: Engine, out: Path) -> Path:
 
     The text of the deck is not hashed (a comment in a template renames no runs); the file of a user's law is.
     """
-    determinants = {"case": case.determinants(), "deck": CONTENT_VERSION, "engine": engine.sha256, "format": FORMAT}
-    if law_sha256 := case.recorded_law.sha256 if case.recorded_law else source_sha256(case.liquid.law):
+    determinants = {
+        "case": case.determinants(),
+        "deck": CONTENT_VERSION,
+        "engine": engine.sha256,
+        "format": FORMAT,
+    }
+    if (
+        law_sha256 := case.recorded_law.sha256
+        if case.recorded_law
+        else source_sha256(case.liquid.law)
+    ):
         determinants["law"] = law_sha256
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
-    return out / f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
+    return (
+        out
+        / f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
+    )
 
 
 def name_of(case_name: str) -> str:
@@ -101,7 +121,9 @@ def holds_unfinished(directory: Path) -> bool:
         names = {path.name for path in directory.iterdir()}
     except OSError:  # unreadable
         return False
-    return CASE_NAME in names or all(name in (SEGMENTS, FAILURE_NAME) or name.startswith(".case.") for name in names)
+    return CASE_NAME in names or all(
+        name in (SEGMENTS, FAILURE_NAME) or name.startswith(".case.") for name in names
+    )
 
 
 # --- reading ----------------------------------------------------------------------------------------------------------
@@ -110,7 +132,9 @@ def holds_unfinished(directory: Path) -> bool:
 def case_of(directory: Path) -> Case:
     """The resolved case of a run directory; raises `OSError` or `ValueError` if it is unreadable or was changed."""
     file = (directory / CASE_NAME).stat()
-    return with_recorded_law(_case_in(directory.resolve(), file.st_ino, file.st_mtime_ns, file.st_size), directory)
+    return with_recorded_law(
+        _case_in(directory.resolve(), file.st_ino, file.st_mtime_ns, file.st_size), directory
+    )
 
 
 @lru_cache(maxsize=4)
@@ -127,11 +151,15 @@ def with_recorded_law(case: Case, directory: Path) -> Case:
     from walkers.templates.bridge_tables import RecordedLaw
 
     places = (directory, *segment_directories(directory))
-    tables = next((place / BRIDGES_NAME for place in places if (place / BRIDGES_NAME).is_file()), None)
+    tables = next(
+        (place / BRIDGES_NAME for place in places if (place / BRIDGES_NAME).is_file()), None
+    )
     source = directory / LAW_NAME if (directory / LAW_NAME).is_file() else None
     files = [file for file in (tables, source) if file]
     check_unchanged(directory, [file.relative_to(directory).as_posix() for file in files])
-    law = RecordedLaw(tables.read_text("utf-8") if tables else "", source.read_bytes() if source else None)
+    law = RecordedLaw(
+        tables.read_text("utf-8") if tables else "", source.read_bytes() if source else None
+    )
     return case.but(recorded_law=law)
 
 
@@ -140,10 +168,14 @@ def write_case(directory: Path, case: Case) -> None:
     write_json(directory / CASE_NAME, case.as_dict(), at_once=False)
     if case.liquid.law in LAWS:
         return
-    tables = tables_of(case, [(case.contact, case.liquid.of_bridges)], {(1, radius) for radius in case.radii})
+    tables = tables_of(
+        case, [(case.contact, case.liquid.of_bridges)], {(1, radius) for radius in case.radii}
+    )
     write_bytes(directory / BRIDGES_NAME, tables.encode("utf-8"), at_once=False)
     file = None if case.recorded_law else source_of(case.liquid.law)
-    if (source := file.read_bytes() if file else getattr(case.recorded_law, "source", None)) is not None:
+    if (
+        source := file.read_bytes() if file else getattr(case.recorded_law, "source", None)
+    ) is not None:
         write_bytes(directory / LAW_NAME, source, at_once=False)
 
 
@@ -169,7 +201,11 @@ def files_of_segments(directory: Path) -> list[str]:
     dumps = {name for segment in segments[:1] for name in layout_of(segment).dumps}
     files = [path for segment in segments for path in segment.iterdir() if path.is_file()]
     by_hand = [directory] == segments  # with tables and pictures beside
-    return [path.relative_to(directory).as_posix() for path in files if not by_hand or path.name in dumps]
+    return [
+        path.relative_to(directory).as_posix()
+        for path in files
+        if not by_hand or path.name in dumps
+    ]
 
 
 def leave_out_dumps(directory: Path) -> None:
@@ -213,7 +249,11 @@ def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
     """Write a deck, its files and its layout into a directory; files that are the same in ``before`` are linked."""
     for name, text in {DECK_NAME: deck.text, **deck.files}.items():
         contents = text.encode("utf-8", "surrogateescape")
-        if before is not None and (before / name).is_file() and (before / name).read_bytes() == contents:
+        if (
+            before is not None
+            and (before / name).is_file()
+            and (before / name).read_bytes() == contents
+        ):
             link_or_copy(before / name, directory / name)
         else:
             (directory / name).write_bytes(contents)
@@ -221,10 +261,19 @@ def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
 
 
 def write_segment_record(
-    directory: Path, segment: Segment, report: EngineReport, rms_velocity: float | None = None, **more: Any
+    directory: Path,
+    segment: Segment,
+    report: EngineReport,
+    rms_velocity: float | None = None,
+    **more: Any,
 ) -> dict[str, Any]:
     """Write the steps and the cost of a segment into its directory, and return this record."""
-    record = {**segment._asdict(), **vars(report), "root_mean_square_velocity": rms_velocity, **more}
+    record = {
+        **segment._asdict(),
+        **vars(report),
+        "root_mean_square_velocity": rms_velocity,
+        **more,
+    }
     write_json(directory / SEGMENT_NAME, record, at_once=False)
     return record
 
@@ -254,7 +303,9 @@ def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
         yield
     except OSError as error:
         # Whoever removes the directory may not have come to the end.
-        if error.errno == errno.ENOENT and Path(error.filename or "").absolute().is_relative_to(incomplete.absolute()):
+        if error.errno == errno.ENOENT and Path(error.filename or "").absolute().is_relative_to(
+            incomplete.absolute()
+        ):
             raise OutputGone(incomplete) from error
         if error.errno == errno.EFBIG:
             raise FileTooLarge(incomplete) from error
@@ -268,7 +319,9 @@ def move_into_place(complete: Path, place: Path) -> None:
     recover(place)
     replaced = place.with_name(place.name + REPLACED)
     if place.exists():
-        for case_file in place.glob("*.toml"):  # of an unpacked archive: it may be the file that was run
+        for case_file in place.glob(
+            "*.toml"
+        ):  # of an unpacked archive: it may be the file that was run
             if not (complete / case_file.name).exists():
                 link_or_copy(case_file, complete / case_file.name)
         place.rename(replaced)
@@ -329,7 +382,9 @@ def recomputed(directory: Path, names: Collection[str]) -> Iterator[None]:
             write_json(directory / MANIFEST_NAME, contents)
         yield
         sums |= checksums(directory, names)
-        contents.setdefault("files", {}).update({name: (directory / name).stat().st_size for name in names})
+        contents.setdefault("files", {}).update(
+            {name: (directory / name).stat().st_size for name in names}
+        )
         contents["tabulated"] = {**software(), "date": iso_time(time.time()), "files": list(names)}
         write_json(directory / MANIFEST_NAME, contents)
 

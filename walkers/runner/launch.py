@@ -98,12 +98,23 @@ def launch(
     ranks, temporary = deck.layout.ranks, Path(os.environ.get("TMPDIR", "/tmp"))
     check_room(directory, deck.layout.bead_dump_bytes)
     if ranks > 1 and shutil.which("mpirun") is None:
-        raise failures.EngineNeverStarted(f"run.ranks = {ranks} needs mpirun: apt-get install openmpi-bin", directory)
+        raise failures.EngineNeverStarted(
+            f"run.ranks = {ranks} needs mpirun: apt-get install openmpi-bin", directory
+        )
     if ranks > 1 and temporary.is_dir():
         check_room(temporary, _TEMPORARY_BYTES)
     plugin = plugin_of(engine)
     write_run_script(directory, engine, plugin, ranks)
-    command = [*_before(ranks), "env", f"LD_PRELOAD={plugin}", str(engine.path), "-log", "none", "-in", DECK_NAME]
+    command = [
+        *_before(ranks),
+        "env",
+        f"LD_PRELOAD={plugin}",
+        str(engine.path),
+        "-log",
+        "none",
+        "-in",
+        DECK_NAME,
+    ]
     tell = on_step or (lambda _: None)
     starts_left = 3
     while True:
@@ -164,9 +175,13 @@ def _off_the_network() -> tuple[str, ...]:
     for unshared in _UNSHARED:
         prefix = (*unshared, *_LOOPBACK_ALONE)
         with suppress(OSError, subprocess.CalledProcessError):
-            subprocess.run([*prefix, "true"], stdin=subprocess.DEVNULL, capture_output=True, check=True)
+            subprocess.run(
+                [*prefix, "true"], stdin=subprocess.DEVNULL, capture_output=True, check=True
+            )
             return prefix
-    warnings.warn("mpirun listens on all networks: unshare (util-linux) cannot take them away", stacklevel=2)
+    warnings.warn(
+        "mpirun listens on all networks: unshare (util-linux) cannot take them away", stacklevel=2
+    )
     return ()
 
 
@@ -226,7 +241,9 @@ class _Watch:
         dump = self.directory / self.layout.bead_dump
         return dump.stat().st_size if dump.exists() else 0
 
-    def run(self, command: Sequence[str], on_step: Callable[[int], None], keep_open: Sequence[int]) -> EngineReport:
+    def run(
+        self, command: Sequence[str], on_step: Callable[[int], None], keep_open: Sequence[int]
+    ) -> EngineReport:
         """Start an engine and watch it to its end."""
         # A user's Open MPI settings for a cluster, such as the network, may not work on one machine. The loader
         # would report the LD_PRELOAD of the user as an ERROR before.
@@ -256,7 +273,9 @@ class _Watch:
             if process is not None:
                 _end(process)
                 with suppress(OSError):  # a folder that is gone
-                    if self.log.stat().st_size > self.deck.log_limit:  # written before the engine ended
+                    if (
+                        self.log.stat().st_size > self.deck.log_limit
+                    ):  # written before the engine ended
                         os.truncate(self.log, int(self.deck.log_limit))
         report = self.verdict(process.returncode)
         on_step(self.step)
@@ -272,7 +291,9 @@ class _Watch:
                 self._take_in(whole + newline)
                 self.rest = self.rest[:_CHUNK_BYTES]  # a line without end
         now, grown = time.perf_counter(), self.read + self.written
-        self.silent = 0.0 if grown != self.grown else self.silent + min(now - self.looked, _LONGEST_LOOK)
+        self.silent = (
+            0.0 if grown != self.grown else self.silent + min(now - self.looked, _LONGEST_LOOK)
+        )
         self.looked, self.grown = now, grown
 
     def _take_in(self, lines: bytes) -> None:
@@ -288,13 +309,17 @@ class _Watch:
         if words := lines.strip():
             self.last_line = words.rsplit(b"\n", 1)[-1]
 
-    def _judge(self, step: int, atoms: int, speed: float, bounds: Sequence[float]) -> failures.EngineFailure | None:
+    def _judge(
+        self, step: int, atoms: int, speed: float, bounds: Sequence[float]
+    ) -> failures.EngineFailure | None:
         """The failure that a status line shows, given the line before; None if there is none."""
         fastest, lost = self.deck.fastest, self.layout.atoms - atoms
         seconds, clearance = (step - self.step) * self.layout.time_step, self.clearance
         sides = list(zip(*self.deck.box, bounds[::2], bounds[1::2], strict=True))
         over = self.nearest_is_top
-        self.clearance = min(min(low - floor, ceiling - high) for floor, ceiling, low, high in sides)
+        self.clearance = min(
+            min(low - floor, ceiling - high) for floor, ceiling, low, high in sides
+        )
         self.nearest_is_top = sides[2][1] - sides[2][3] == self.clearance
         self.step = step
         if not speed <= fastest:
@@ -318,10 +343,16 @@ class _Watch:
                 "beads or a lower acceleration), or left the sides of a boundary without a rim"
             )
         sentence = f"{left}: {cause}"
-        return (failures.BeadsOverTheTop if over else failures.BeadsLost)(sentence, self.directory, lost=lost)
+        return (failures.BeadsOverTheTop if over else failures.BeadsLost)(
+            sentence, self.directory, lost=lost
+        )
 
     def _blow_up(self, speed: float) -> failures.BlowUp:
-        seen = f"moves at {speed:.3g} m/s" if math.isfinite(speed) else "has a speed or position that is not a number"
+        seen = (
+            f"moves at {speed:.3g} m/s"
+            if math.isfinite(speed)
+            else "has a speed or position that is not a number"
+        )
         if speed <= self.deck.fastest:
             seen = "left the box at a time step beyond its limits"
         return failures.BlowUp(
@@ -344,7 +375,9 @@ class _Watch:
             message = f"the engine wrote nothing for {deck.silence:g} s after {at}; it was stopped"
             raise failures.EngineSilent(message, self.directory)
         if time.perf_counter() - self.begin > self.time_limit:
-            raise failures.TimeLimitExceeded(f"time limit of {self.time_limit:g} s reached at {at}", self.directory)
+            raise failures.TimeLimitExceeded(
+                f"time limit of {self.time_limit:g} s reached at {at}", self.directory
+            )
         missing = self.layout.bead_dump_bytes - self.written
         free = shutil.disk_usage(self.directory).free
         if missing > 0 and free < _SPARE_BYTES:
@@ -352,13 +385,19 @@ class _Watch:
 
     def verdict(self, status: int) -> EngineReport:
         """Judge a run that has ended: raise its failure, or return its cost."""
-        wall_seconds, layout, self.time_limit = time.perf_counter() - self.begin, self.layout, math.inf
+        wall_seconds, layout, self.time_limit = (
+            time.perf_counter() - self.begin,
+            self.layout,
+            math.inf,
+        )
         self.look()
         self._take_in(self.rest)  # the last line may lack its end
         self.check()
         words = f", last line: {_text(self.last_line)}" if self.last_line else ", without output"
         if status > 0 and self.version is None and not self.error.startswith(b"ERROR"):
-            raise failures.EngineNeverStarted(f"the engine never started: exit status {status}{words}", self.directory)
+            raise failures.EngineNeverStarted(
+                f"the engine never started: exit status {status}{words}", self.directory
+            )
         if b"a bead's position is no number" in self.error:
             raise self._blow_up(math.nan)
         if self.error or status > 0:
@@ -367,16 +406,26 @@ class _Watch:
         if status == -signal.SIGXFSZ:
             raise failures.FileTooLarge(self.directory)
         if status < 0:
-            name = signal.Signals(-status).name if -status in set(signal.Signals) else f"signal {-status}"
+            name = (
+                signal.Signals(-status).name
+                if -status in set(signal.Signals)
+                else f"signal {-status}"
+            )
             raise failures.EngineKilled(f"the engine was killed by {name}", self.directory)
         frames_of_beads = self.written / layout.bead_dump_bytes * layout.frames
         dumps = (layout.pair_bridge_dump, layout.wall_bridge_dump)
-        frames_of_bridges = [(_complete_frames(self.directory / name), layout.bridge_frames) for name in dumps]
+        frames_of_bridges = [
+            (_complete_frames(self.directory / name), layout.bridge_frames) for name in dumps
+        ]
         for frames, expected in [(frames_of_beads, layout.frames), *frames_of_bridges]:
             if frames != expected:
-                message = f"the engine wrote {int(frames)} of {expected} frames and reported no error"
+                message = (
+                    f"the engine wrote {int(frames)} of {expected} frames and reported no error"
+                )
                 raise failures.MissingFrames(message, self.directory)
-        return EngineReport(self.version or "unknown", wall_seconds, self.loop_seconds, layout.steps)
+        return EngineReport(
+            self.version or "unknown", wall_seconds, self.loop_seconds, layout.steps
+        )
 
 
 def _complete_frames(path: Path) -> int:

@@ -25,7 +25,14 @@ FORMAT = 3
 
 
 def write_manifest(
-    case: Case, name: str, engine: Engine | None, report: EngineReport, *, started: float, directory: Path, **more: Any
+    case: Case,
+    name: str,
+    engine: Engine | None,
+    report: EngineReport,
+    *,
+    started: float,
+    directory: Path,
+    **more: Any,
 ) -> None:
     """Write the manifest of a run, after its other files; ``started`` in s after the epoch; no engine: run by hand."""
     finished = time.time()
@@ -99,7 +106,9 @@ def check_unchanged(directory: Path, names: Collection[str]) -> bool:
         if now != recorded[name]:
             message = f"has changed since the run was finished; list all changes with: walkers check files {directory}"
             if name == "result.json" or name.endswith(".parquet"):
-                message += f"; to measure the run again, delete the file and do: walkers run {directory}"
+                message += (
+                    f"; to measure the run again, delete the file and do: walkers run {directory}"
+                )
             raise FileChanged(f"{directory / name} {message}")
     return len(recorded) == len(names)
 

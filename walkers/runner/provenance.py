@@ -33,7 +33,12 @@ def software() -> dict[str, Any]:
             packages[name] = metadata.version(name)
     version, _, built = version.partition("+")
     commit = commit_of(Path(__file__).resolve().parents[2]) or built.removeprefix("g") or None
-    return {"granular_walkers": version, "commit": commit, "python": platform.python_version(), "packages": packages}
+    return {
+        "granular_walkers": version,
+        "commit": commit,
+        "python": platform.python_version(),
+        "packages": packages,
+    }
 
 
 def commit_of(checkout: Path) -> str | None:
@@ -42,8 +47,18 @@ def commit_of(checkout: Path) -> str | None:
         return None
     # A git hook may set another repository. Nothing is written, because many processes may ask at once.
     ours = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
-    command = ["git", "--no-optional-locks", "describe", "--always", "--abbrev=40", "--exclude=*", "--dirty=+changes"]
+    command = [
+        "git",
+        "--no-optional-locks",
+        "describe",
+        "--always",
+        "--abbrev=40",
+        "--exclude=*",
+        "--dirty=+changes",
+    ]
     how: dict[str, Any] = {"cwd": checkout, "env": ours, "timeout": _PATIENCE_SECONDS, "text": True}
-    with suppress(OSError, subprocess.SubprocessError):  # no git here, or a file system that does not answer
+    with suppress(
+        OSError, subprocess.SubprocessError
+    ):  # no git here, or a file system that does not answer
         return str(subprocess.run(command, check=True, capture_output=True, **how).stdout).strip()
     return None

@@ -46,7 +46,10 @@ _KEYS: Mapping[str, str] = {
     "density": "beads.density",
     "viscosity": "liquid.dynamic_viscosity",
     **{f"friction_{pair}": f"contact.friction.{pair}" for pair in ("bead_bead", "bead_wall")},
-    **{name: f"contact.{name}" for name in ("youngs_modulus", "poissons_ratio", "restitution", "rolling_friction")},
+    **{
+        name: f"contact.{name}"
+        for name in ("youngs_modulus", "poissons_ratio", "restitution", "rolling_friction")
+    },
 }
 """For parameters of a deck, the key of a case."""
 _SCALE = """# Writes tables for another viscosity: the deck gives the factor of the resistances.
@@ -66,14 +69,20 @@ def write_folder(case: Case, folder: Path) -> Path:
     try:
         folder.mkdir(parents=True)
     except OSError as error:
-        raise refused(folder, f"cannot make the folder ({error.strerror}): expected the name of a new one") from error
+        raise refused(
+            folder, f"cannot make the folder ({error.strerror}): expected the name of a new one"
+        ) from error
     try:
         on_disk.write_deck(deck, folder)
         (folder / decks.SCALE_NAME).write_text(_SCALE, encoding="utf-8")
         write_run_script(folder, engine, plugin, deck.layout.ranks)
         if law := source_of(case.liquid.law):
             shutil.copyfile(law, folder / on_disk.LAW_NAME)
-        record = {"case": case.as_dict(), "deck": deck.text, "sha256": checksums(folder, deck.files)}
+        record = {
+            "case": case.as_dict(),
+            "deck": deck.text,
+            "sha256": checksums(folder, deck.files),
+        }
         write_json(folder / on_disk.DECK_RECORD_NAME, record)
     except OSError as error:  # a disk that is full names no file
         error.filename = str(folder)
@@ -99,10 +108,15 @@ def take_in(folder: Path) -> None:
 
     `InputError` if the deck was not run, is still running, or failed; or its files cannot be read.
     """
-    deck, logs = folder / decks.DECK_NAME, [folder / name for name in _LOGS if (folder / name).is_file()]
+    deck, logs = (
+        folder / decks.DECK_NAME,
+        [folder / name for name in _LOGS if (folder / name).is_file()],
+    )
     if not logs:
         expected = f"expected a log of the engine, {' or '.join(_LOGS)}"
-        raise refused(folder, f"the deck was not run ({expected}); do: cd {folder} && sh {decks.RUN_NAME}")
+        raise refused(
+            folder, f"the deck was not run ({expected}); do: cd {folder} && sh {decks.RUN_NAME}"
+        )
     log, manifest = max(logs, key=_age), folder / MANIFEST_NAME
     if manifest.is_file() and _age(manifest) >= max(_age(deck), _age(log)):
         return
@@ -127,15 +141,23 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
 
     record = read_json(folder / on_disk.DECK_RECORD_NAME)
     before = on_disk.with_recorded_law(stored_case(record["case"]), folder)
-    words = (_PRINTED.findall(log.read_text(encoding="utf-8", errors="replace")) or [""])[-1].split()
+    words = (_PRINTED.findall(log.read_text(encoding="utf-8", errors="replace")) or [""])[
+        -1
+    ].split()
     values = {name: float(value) for name, value in zip(words[::2], words[1::2], strict=True)}
     was = _parameters(record["deck"], values)
-    edited = {name: now for name, now in values.items() if name in was and not isclose(now, was[name], rel_tol=_SAME)}
+    edited = {
+        name: now
+        for name, now in values.items()
+        if name in was and not isclose(now, was[name], rel_tol=_SAME)
+    }
     case = before.for_cycles(before.run.attempts[0])
     if edited:
         case = _edited(case, values, edited, f"{folder}: the edited deck")
     edits = [f"{name} {value:g}, was {was[name]:g}" for name, value in edited.items()]
-    edits += _other_edits(record["deck"], deck.read_text(encoding="utf-8", errors="surrogateescape"), values)
+    edits += _other_edits(
+        record["deck"], deck.read_text(encoding="utf-8", errors="surrogateescape"), values
+    )
     edits += _edited_files(record.get("sha256", {}), folder)
     rest = int(values.get("rest_steps", 0))
     segment = Segment(0, rest + case.run.steps, rest)
@@ -151,12 +173,16 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
     on_disk.write_segment_record(folder, segment, report, by_hand=notes, deck_edited=bool(edits))
     # Cycles that were enough for the finished run of a case may be too few for an edited deck.
     planned = before.run
-    doubtful = case.run.cycles < planned.cycles if planned.until_steady else case.apart and case != before
+    doubtful = (
+        case.run.cycles < planned.cycles if planned.until_steady else case.apart and case != before
+    )
     if doubtful and not are_constant(folder):
         reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
         more = f"{planned.cycles}, as walkers run does," if planned.until_steady else "more"
         notes.append(f"{reached}; set cycles to {more} and run again")
-        on_disk.write_segment_record(folder, segment, report, by_hand=notes, deck_edited=bool(edits))
+        on_disk.write_segment_record(
+            folder, segment, report, by_hand=notes, deck_edited=bool(edits)
+        )
     measure(folder)
     about: dict[str, Any] = {"drive_from": rest, "segments": 1, "by_hand": notes}
     scaled = folder / decks.SCALED_BRIDGES_NAME
@@ -166,7 +192,9 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
 
 def _parameters(deck: str, values: Mapping[str, float]) -> dict[str, float]:
     """The parameters of a deck as it was written; those that follow from others, from the new values of these."""
-    was = {name: float(text) for name, text in _LINE.findall(deck) if name in values and text[0] != "$"}
+    was = {
+        name: float(text) for name, text in _LINE.findall(deck) if name in values and text[0] != "$"
+    }
     now = {**was, **values}
     for end in (name.removeprefix("amplitude") for name in values if name.startswith("amplitude")):
         peak, turning = now[f"peak_acceleration{end}"], 2.0 * pi * now[f"frequency{end}"]
@@ -175,20 +203,31 @@ def _parameters(deck: str, values: Mapping[str, float]) -> dict[str, float]:
     return was | {"time_step": 1.0 / (cycle * now["steps_per_cycle"])}
 
 
-def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float], source: str) -> Case:
+def _edited(
+    case: Case, values: Mapping[str, float], edited: Mapping[str, float], source: str
+) -> Case:
     """The case that the engine ran, from the parameters that it printed."""
     keys, number_of_sines = dict(_KEYS), len(case.excitation.harmonics)
     for place, end in enumerate(suffixes(number_of_sines)):
         table = "drive" if number_of_sines == 1 else f"drive.harmonics[{place}]"
         keys |= {f"{name}{end}": f"{table}.{name}" for name in _OF_SINES}
     numbers = {keys[name]: value for name, value in edited.items() if name in keys}
-    for name, key in keys.items():  # a deck has no Γ0: the acceleration is that for the density for which it was made
-        if key.endswith("peak_acceleration") and case.document["drive"].get("waveform", "sine") == "sine":
+    for (
+        name,
+        key,
+    ) in (
+        keys.items()
+    ):  # a deck has no Γ0: the acceleration is that for the density for which it was made
+        if (
+            key.endswith("peak_acceleration")
+            and case.document["drive"].get("waveform", "sine") == "sine"
+        ):
             end = name.removeprefix("peak_acceleration")
             implied = values[f"amplitude{end}"] * (2.0 * pi * values[f"frequency{end}"]) ** 2
             numbers[key] = implied if f"amplitude{end}" in edited else values[name]
     changes: dict[str, Any] = {
-        key: f"{number!r} {kind.unit}" if (kind := kind_of(key)) else number for key, number in numbers.items()
+        key: f"{number!r} {kind.unit}" if (kind := kind_of(key)) else number
+        for key, number in numbers.items()
     }
     step, steps, cycles = values["time_step"], int(values["steps_per_cycle"]), int(values["cycles"])
     if "viscosity" in edited:
@@ -196,8 +235,12 @@ def _edited(case: Case, values: Mapping[str, float], edited: Mapping[str, float]
     if "steps_per_cycle" in edited:
         changes |= {"run.time_step": f"{step!r} s", "run.allow_unstable": True}
     if "cycles" in edited:
-        changes |= {"run.cycles": cycles} | ({"run.settling_cycles": settling_of(cycles)} if case.apart else {})
-    ran = build_case(changed(CaseFile, case.document, changes), source=source, name=case.name).for_cycles(cycles)
+        changes |= {"run.cycles": cycles} | (
+            {"run.settling_cycles": settling_of(cycles)} if case.apart else {}
+        )
+    ran = build_case(
+        changed(CaseFile, case.document, changes), source=source, name=case.name
+    ).for_cycles(cycles)
     frequency, parts = ran.excitation.frequency, case.run.samples_per_cycle
     if not isclose(step * steps * frequency, 1.0, rel_tol=_SAME) or steps % parts:
         raise ValueError(
@@ -224,8 +267,18 @@ def _other_edits(written: str, edited_text: str, parameters: Collection[str]) ->
         return (named := _LINE.match(line)) is not None and named[1] in parameters
 
     before, after = (
-        [" ".join(line.partition("#")[0].split()) for line in text.splitlines() if not sets_parameter(line)]
+        [
+            " ".join(line.partition("#")[0].split())
+            for line in text.splitlines()
+            if not sets_parameter(line)
+        ]
         for text in (written, edited_text)
     )
-    lines = [line for line in after if line not in [*before, ""]] or [line for line in before if line not in after]
-    return [f"{len(lines)} other line(s), which are not part of the case, first: {lines[0]}"] if lines else []
+    lines = [line for line in after if line not in [*before, ""]] or [
+        line for line in before if line not in after
+    ]
+    return (
+        [f"{len(lines)} other line(s), which are not part of the case, first: {lines[0]}"]
+        if lines
+        else []
+    )

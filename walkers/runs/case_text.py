@@ -26,7 +26,9 @@ class FlatCase(dict[str, Any]):
 def flattened(case: Case) -> FlatCase:
     """The values of a case as plain JSON types, by the keys of a case file."""
     flat = FlatCase(
-        (origin.key, to_jsonable_python(origin.value)) for origin in case.origins if origin.value is not None
+        (origin.key, to_jsonable_python(origin.value))
+        for origin in case.origins
+        if origin.value is not None
     )
     if case.placed:  # which have no origins, because there may be hundreds
         flat["placed"] = [[*bead.at, bead.radius] for bead in case.placed]
@@ -43,7 +45,9 @@ def readable(key: str, value: Any) -> str:
     if key.startswith("contact.roughness."):
         return f"{value * 1e9:.6g} nm"
     if key == "drive.ramp":  # pairs of a time and a pure number
-        return ", ".join(f"({text_of(time, kind_of(key))}, {text_of(factor)})" for time, factor in value)
+        return ", ".join(
+            f"({text_of(time, kind_of(key))}, {text_of(factor)})" for time, factor in value
+        )
     return text_of(value, kind_of(key))
 
 
@@ -54,9 +58,13 @@ def has_value(case: Mapping[str, Any], condition: str) -> bool | None:
     """
     key, _, text = (part.strip() for part in condition.partition("="))
     if not (key and text):
-        raise refused("where", f'"{condition}": expected KEY=VALUE, such as "drive.frequency=80 Hz"')
+        raise refused(
+            "where", f'"{condition}": expected KEY=VALUE, such as "drive.frequency=80 Hz"'
+        )
     values = {name: value for name, value in case.items() if f".{name}".endswith(f".{key}")}
-    return any(_is(name, value, text.strip('"')) for name, value in values.items()) if values else None
+    return (
+        any(_is(name, value, text.strip('"')) for name, value in values.items()) if values else None
+    )
 
 
 def _is(key: str, value: Any, text: str) -> bool:
@@ -66,16 +74,22 @@ def _is(key: str, value: Any, text: str) -> bool:
         return text.lower() in (readable(key, value).lower(), str(value).lower())
     kind = kind_of(key)
     try:
-        return isclose(units.parse_quantity(text, kind) if kind else float(text), value, rel_tol=1e-6)
+        return isclose(
+            units.parse_quantity(text, kind) if kind else float(text), value, rel_tol=1e-6
+        )
     except ValueError as error:
-        raise refused("where", f'"{key}={text}": {error if kind else "expected a number without a unit"}') from error
+        raise refused(
+            "where", f'"{key}={text}": {error if kind else "expected a number without a unit"}'
+        ) from error
 
 
 @cache
 def kind_of(key: str) -> Kind | None:
     """Kind of quantity of a key of a case, such as ``dimers.radii[0]``; None for pure numbers."""
     fields = (field for name, field in keys_of(CaseFile).items() if _ending(name) == _ending(key))
-    return next(filter(None, (units.kind_in([*field.metadata, field.annotation]) for field in fields)), None)
+    return next(
+        filter(None, (units.kind_in([*field.metadata, field.annotation]) for field in fields)), None
+    )
 
 
 def _ending(key: str) -> str:
@@ -94,14 +108,19 @@ def differing(cases: Sequence[FlatCase]) -> tuple[list[str], list[str]]:
     words = {key: {case.words.get(key, "") for case in cases} for key in varied}
     given = [key for key in varied if any(word.startswith("given") for word in words[key])]
     rest = [key for key in varied if key not in given]
-    return given, [key for key in rest if "" not in words[key] or words[key] - {"", "default", "derived"}]
+    return given, [
+        key for key in rest if "" not in words[key] or words[key] - {"", "default", "derived"}
+    ]
 
 
 def short_keys(keys: Sequence[str], reserved: Iterable[str] = ("name",)) -> list[str]:
     """The last parts of keys; the whole key if another key has the same last part, or if it is ``reserved``."""
     last = [key.rpartition(".")[2] for key in keys]
     taken = set(reserved).difference(keys)
-    return [key if end in taken or last.count(end) > 1 else end for key, end in zip(keys, last, strict=True)]
+    return [
+        key if end in taken or last.count(end) > 1 else end
+        for key, end in zip(keys, last, strict=True)
+    ]
 
 
 def _comparable(value: Any) -> Hashable:

@@ -135,7 +135,9 @@ def _without_directory(out: Path, listed: set[Path]) -> list[Entry]:
         place = lock.with_suffix("")
         if place not in listed and on_disk.is_locked(place):
             case = place.name.rpartition("-")[0]
-            runs.append(Entry(kind="run", name=place.name, case=case, status="running", directory=place))
+            runs.append(
+                Entry(kind="run", name=place.name, case=case, status="running", directory=place)
+            )
     return runs
 
 

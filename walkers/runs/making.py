@@ -74,8 +74,14 @@ def make_runs(
     with on_disk.locked(places) as ours:
         for place in ours:
             on_disk.recover(place)
-        runs = {} if force else {place.name: False for place in places if on_disk.is_finished(place)}
-        missing = {place: case for place, case in places.items() if place in ours and place.name not in runs}
+        runs = (
+            {} if force else {place.name: False for place in places if on_disk.is_finished(place)}
+        )
+        missing = {
+            place: case
+            for place, case in places.items()
+            if place in ours and place.name not in runs
+        }
         locks = [ours[place] for place in missing]
         if len(missing) == 1:
             ((place, case),) = missing.items()
@@ -115,7 +121,11 @@ def progress_at(place: Path, case: Case | None = None) -> Progress | None:
         done = [_read_segment(path) for path in on_disk.segment_directories(directory)]
         (folder,) = (directory / on_disk.SEGMENTS).glob("*.new")
         run = case.run
-        cycles = on_disk.layout_of(folder).steps // run.steps_per_cycle if run.until_steady else run.cycles
+        cycles = (
+            on_disk.layout_of(folder).steps // run.steps_per_cycle
+            if run.until_steady
+            else run.cycles
+        )
         begin = int(done[-1]["end"]) if done else 0
         start = on_disk.drive_from(case, done)
         step = max(begin, last_step(folder / decks.OUTPUT_NAME))
@@ -157,7 +167,11 @@ def share_kept(place: Path) -> float | None:
 
 def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: float) -> Progress:
     """Progress at a step of a segment, ``seconds`` after its begin, in the attempt with a number of cycles."""
-    before, steps, start = run.steps_until(cycles - 1), run.steps_until(run.cycles), segment.drive_from
+    before, steps, start = (
+        run.steps_until(cycles - 1),
+        run.steps_until(run.cycles),
+        segment.drive_from,
+    )
     step = max(step, segment.begin)
     done = before + (0 if start is None else step - start)
     rate = (step - segment.begin) / seconds if seconds >= _STARTING_SECONDS else 0.0
@@ -172,7 +186,9 @@ def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: flo
 
 
 def _are_constant(directory: Path) -> bool:
-    from walkers.postprocess.measure.gait import are_constant  # numpy is loaded while the engine runs
+    from walkers.postprocess.measure.gait import (
+        are_constant,
+    )  # numpy is loaded while the engine runs
 
     return are_constant(directory)
 
@@ -210,7 +226,9 @@ class OpenRun:
         for cycles in self.case.run.attempts:
             case = self.case.for_cycles(cycles)
             if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
-                for directory in on_disk.segment_directories(self.directory):  # of an attempt with fewer cycles
+                for directory in on_disk.segment_directories(
+                    self.directory
+                ):  # of an attempt with fewer cycles
                     shutil.rmtree(directory)
                 self.done.clear()
             while (segment := self._next_segment(case)).end > segment.begin:
@@ -226,26 +244,40 @@ class OpenRun:
                         raise
                     # A climber left the container: this ends the experiment; the segments before are valid.
                     shutil.rmtree(self.directory / on_disk.SEGMENTS / f"{len(self.done):04d}.new")
-                    self.ended = f"{over.lost} bead(s) left the container over its walls in the next segment"
+                    self.ended = (
+                        f"{over.lost} bead(s) left the container over its walls in the next segment"
+                    )
                     return
             if cycles < self.case.run.cycles and _are_constant(self.directory):
                 return
 
     def _has_climbed(self) -> bool:
         """Whether a cluster has climbed in the complete segments."""
-        from walkers.postprocess.measure.motion import read_motion  # numpy is loaded while the engine runs
+        from walkers.postprocess.measure.motion import (
+            read_motion,
+        )  # numpy is loaded while the engine runs
         from walkers.postprocess.measure.piles import has_climbed
 
-        if on_disk.drive_from(self.case, self.done[:-1]) is None:  # the beads came to rest in this segment
+        if (
+            on_disk.drive_from(self.case, self.done[:-1]) is None
+        ):  # the beads came to rest in this segment
             return False
         return has_climbed(read_motion(self.directory))
 
     def _next_segment(self, case: Case) -> Segment:
         return decks.next_segment(
-            case, int(self.done[-1]["end"]) if self.done else 0, on_disk.drive_from(self.case, self.done)
+            case,
+            int(self.done[-1]["end"]) if self.done else 0,
+            on_disk.drive_from(self.case, self.done),
         )
 
-    def _make(self, segment: Segment, deck: Deck, tell: Callable[[int], None] | None, time_limit: float | None) -> None:
+    def _make(
+        self,
+        segment: Segment,
+        deck: Deck,
+        tell: Callable[[int], None] | None,
+        time_limit: float | None,
+    ) -> None:
         folder, number = self.directory / on_disk.SEGMENTS, len(self.done)
         new, before = folder / f"{number:04d}.new", folder / f"{number - 1:04d}"
         shutil.rmtree(new, ignore_errors=True)
@@ -260,14 +292,20 @@ class OpenRun:
             on_disk.write_deck(deck, new, before if number else None)
             if segment.begin:
                 shutil.copyfile(before / decks.RESTART_NAME, new / decks.PREVIOUS_RESTART_NAME)
-            report = launch(deck, new, self.engine, on_step=tell, time_limit=time_limit, keep_open=self.locks)
+            report = launch(
+                deck, new, self.engine, on_step=tell, time_limit=time_limit, keep_open=self.locks
+            )
             (new / decks.PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
             restart = new / decks.RESTART_NAME
             size = restart.stat().st_size if restart.exists() else 0
-            if not self.case.run.in_one and size < _LEAST_BYTES * deck.layout.atoms:  # the engine does not check this
+            if (
+                not self.case.run.in_one and size < _LEAST_BYTES * deck.layout.atoms
+            ):  # the engine does not check this
                 raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
             velocities = _RMS_VELOCITY.findall((new / decks.OUTPUT_NAME).read_bytes())
-            record = on_disk.write_segment_record(new, segment, report, float(velocities[-1]) if velocities else None)
+            record = on_disk.write_segment_record(
+                new, segment, report, float(velocities[-1]) if velocities else None
+            )
             os.sync()  # so that the new name survives a loss of power; faster than file by file
             new.rename(folder / f"{number:04d}")
             fsync_path(folder)
@@ -281,10 +319,18 @@ class OpenRun:
         wall_seconds, loop_seconds = (
             sum(record[name] for record in self.done) for name in ("wall_seconds", "loop_seconds")
         )
-        report = EngineReport(self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"]))
+        report = EngineReport(
+            self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"])
+        )
         start = on_disk.drive_from(self.case, self.done) or 0
-        rest = [segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start]
-        about: dict[str, Any] = {"started": self.started, "directory": self.directory, "segments": len(self.done)}
+        rest = [
+            segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start
+        ]
+        about: dict[str, Any] = {
+            "started": self.started,
+            "directory": self.directory,
+            "segments": len(self.done),
+        }
         about |= {"drive_from": start, "settled": rest[-1] if rest else None}
         about |= {"ended": self.ended} if self.ended else {}
         write_manifest(self.case, self.place.name, self.engine, report, **about)
@@ -292,10 +338,14 @@ class OpenRun:
         on_disk.move_into_place(self.directory, self.place)
 
 
-def _teller(run: Run, cycles: int, segment: Segment, tell: Tell | None) -> Callable[[int], None] | None:
+def _teller(
+    run: Run, cycles: int, segment: Segment, tell: Tell | None
+) -> Callable[[int], None] | None:
     """A function that reports the progress of the run at a step of a segment."""
     begin = time.perf_counter()
-    return tell and (lambda step: tell(progress_in(run, cycles, segment, step, time.perf_counter() - begin)))
+    return tell and (
+        lambda step: tell(progress_in(run, cycles, segment, step, time.perf_counter() - begin))
+    )
 
 
 @contextmanager
@@ -325,7 +375,11 @@ def open_locked(
     except Stopped:
         raise
     except (WalkersError, OSError) as failure:
-        contents = {"reason": type(failure).__name__, "message": str(failure), "lost": getattr(failure, "lost", 0)}
+        contents = {
+            "reason": type(failure).__name__,
+            "message": str(failure),
+            "lost": getattr(failure, "lost", 0),
+        }
         with suppress(OSError):  # the disk may be full; the message reaches the user anyway
             write_json(directory / on_disk.FAILURE_NAME, contents)
         raise
@@ -338,7 +392,9 @@ def _read_segment(directory: Path) -> dict[str, Any]:
             return record
         raise ValueError("begin, end or drive_from is missing or wrong")
     except (OSError, ValueError, KeyError, TypeError) as error:
-        message = f"{directory} is damaged ({error}): delete {directory.parent.parent} and repeat the run"
+        message = (
+            f"{directory} is damaged ({error}): delete {directory.parent.parent} and repeat the run"
+        )
         raise DamagedSegment(message) from error
 
 
@@ -362,7 +418,9 @@ def _make_together(
     shutil.rmtree(incomplete, ignore_errors=True)
     try:
         with on_disk.room_on_disk(incomplete, deck.layout.bead_dump_bytes):
-            check_room(out, 2 * deck.layout.bead_dump_bytes)  # the dump and its parts exist at the same time
+            check_room(
+                out, 2 * deck.layout.bead_dump_bytes
+            )  # the dump and its parts exist at the same time
             (incomplete / DECK_FOLDER).mkdir(parents=True)
             on_disk.write_deck(deck, incomplete / DECK_FOLDER)
             # For other processes the directory is the unfinished first run.
@@ -371,14 +429,27 @@ def _make_together(
                 on_disk.write_case(incomplete / name, case)
             tell = _teller(cases[first].run, cycles, decks.next_segment(tried[first]), on_progress)
             folder = incomplete / DECK_FOLDER
-            report = launch(deck, folder, engine, on_step=tell, time_limit=time_limit, keep_open=locks)
+            report = launch(
+                deck, folder, engine, on_step=tell, time_limit=time_limit, keep_open=locks
+            )
             _part(incomplete, tried, deck, report)
-            done = [name for name in cases if cycles >= cases[name].run.cycles or _are_constant(incomplete / name)]
+            done = [
+                name
+                for name in cases
+                if cycles >= cases[name].run.cycles or _are_constant(incomplete / name)
+            ]
             shared = {"first": first, "runs": len(done), "walkers": len(deck.layout.walkers)}
-            about: dict[str, Any] = {"started": started, "drive_from": 0, "segments": 1, "shared_deck": shared}
+            about: dict[str, Any] = {
+                "started": started,
+                "drive_from": 0,
+                "segments": 1,
+                "shared_deck": shared,
+            }
             for name in done:
                 measure(incomplete / name)
-                write_manifest(cases[name], name, engine, report, directory=incomplete / name, **about)
+                write_manifest(
+                    cases[name], name, engine, report, directory=incomplete / name, **about
+                )
             os.sync()
             for name in done:
                 on_disk.move_into_place(incomplete / name, out / name)
@@ -399,4 +470,6 @@ def _part(incomplete: Path, cases: Mapping[str, Case], deck: Deck, report: Engin
     split_output(incomplete / DECK_FOLDER, deck.layout, places)
     for name, (place, case) in zip(cases, places.items(), strict=True):
         on_disk.write_segment_record(place, decks.next_segment(case), report)
-        shutil.copytree(incomplete / DECK_FOLDER, incomplete / name / DECK_FOLDER, copy_function=link_or_copy)
+        shutil.copytree(
+            incomplete / DECK_FOLDER, incomplete / name / DECK_FOLDER, copy_function=link_or_copy
+        )

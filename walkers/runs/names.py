@@ -117,7 +117,9 @@ class Reference:
         return place if on_disk.is_finished(place) else None
 
 
-def find(given: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> Reference:
+def find(
+    given: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None
+) -> Reference:
     """Find what a user means by a name. No case is read, and no run.
 
     A folder does not hide a shipped case of the same name. The file of a sweep means the sweep if it was run.
@@ -198,5 +200,13 @@ def refusing(directory: Path, contents: str) -> Iterator[None]:
     """Turn the errors of a damaged file into one `InputError`."""
     try:
         yield
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, IndexError, WalkersError) as error:
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        IndexError,
+        WalkersError,
+    ) as error:
         raise refused(directory, f"{contents} cannot be read ({error})") from error

@@ -21,7 +21,9 @@ from walkers.runner.launch import cores_here
 from walkers.text import aligned, printable
 
 _LOOSE_PACKING = 0.55
-_FASTEST_CLIMB = 12e-3  # m/s; none of about a hundred climbs in glycerol at the drive of the paper was faster
+_FASTEST_CLIMB = (
+    12e-3  # m/s; none of about a hundred climbs in glycerol at the drive of the paper was faster
+)
 
 
 def notes(case: Case) -> list[str]:
@@ -32,7 +34,9 @@ def notes(case: Case) -> list[str]:
     largest, reason = limits_of(case).recommended(loose=case.loose)
     times, lines = case.run.time_step / largest, []
     if times < 1e-2:
-        lines = [f"the time step is {_two_digits(1.0 / times)} times smaller than needed ({reason})"]
+        lines = [
+            f"the time step is {_two_digits(1.0 / times)} times smaller than needed ({reason})"
+        ]
     elif times > 1.01:
         lines = [f"the time step is {times:.2g} times the largest of auto ({reason})"]
     lines += gravity_warnings(case)
@@ -44,7 +48,11 @@ def notes(case: Case) -> list[str]:
     if not (case.loose and case.boundary.closed and case.mixture):
         return lines
     numbers = {"large": case.large, "small": case.count - case.large}
-    lines += [f"no {name} beads; in the paper, large beads lead small ones" for name in numbers if not numbers[name]]
+    lines += [
+        f"no {name} beads; in the paper, large beads lead small ones"
+        for name in numbers
+        if not numbers[name]
+    ]
     filled = _volume(case) / (_LOOSE_PACKING * case.boundary.geometry.cross_section)
     room = 2.0 * case.boundary.inner_height - filled
     if not case.run.until and (fastest := room / case.duration) < _FASTEST_CLIMB:
@@ -78,17 +86,25 @@ def summarise(case: Case) -> dict[str, Any]:
     """
     run, drive, limits = case.run, case.excitation, vars(limits_of(case))
     volume = _volume(case)
-    modulus = library_of(case.document).numbers("materials", case.beads.material or "").get("youngs_modulus")
+    modulus = (
+        library_of(case.document)
+        .numbers("materials", case.beads.material or "")
+        .get("youngs_modulus")
+    )
     summary: dict[str, Any] = {
         "case": {**case.as_dict(), "origins": [asdict(origin) for origin in case.origins]},
-        "drive": {name: getattr(drive, name) for name in ("peak_acceleration", "amplitude", "peak_velocity")},
+        "drive": {
+            name: getattr(drive, name)
+            for name in ("peak_acceleration", "amplitude", "peak_velocity")
+        },
         "beads": {
             "small": case.count - case.large,
             "large": case.large,
             "mass": volume * case.beads.density,
             "volume": volume,
             "liquid": _liquid(case, volume),
-            "stiffness_ratio": modulus and case.contact.youngs_modulus / parse_quantity(modulus.written, MODULUS),
+            "stiffness_ratio": modulus
+            and case.contact.youngs_modulus / parse_quantity(modulus.written, MODULUS),
         },
         "notes": notes(case),
         "contacts": [contact for walkers in case.walkers for contact in _contacts(case, walkers)],
@@ -105,7 +121,9 @@ def summarise(case: Case) -> dict[str, Any]:
             "samples": run.steps // run.steps_per_sample + 1,
             "until_steady": run.until_steady,
             "segments": -(-run.cycles // run.cycles_per_segment),
-            "predicted_seconds": PROGRAM_SECONDS + predicted_seconds(case) + predicted_overhead([case]),
+            "predicted_seconds": PROGRAM_SECONDS
+            + predicted_seconds(case)
+            + predicted_overhead([case]),
         },
     }
     if case.boundary.shape == "vessel":
@@ -114,7 +132,10 @@ def summarise(case: Case) -> dict[str, Any]:
         dimer = dimer_of(case)
         numbers = ("total_mass", "mean_radius", "sin_delta", "mass_asymmetry")
         summary["dimer"] = {name: getattr(dimer, name) for name in numbers}
-        summary["dimer"] |= {"masses": list(dimer.masses), "gamma0": dimer.gamma0(drive.peak_acceleration)}
+        summary["dimer"] |= {
+            "masses": list(dimer.masses),
+            "gamma0": dimer.gamma0(drive.peak_acceleration),
+        }
     return summary
 
 
@@ -158,7 +179,11 @@ def _liquid(case: Case, volume: float) -> float:
     """Volume of the liquid on all beads, or, if their menisci give it, in the bridges of the walkers, m³."""
     if case.liquid.meniscus_radius is None:
         return volume * case.liquid.of_bridges.volume_fraction
-    loads = ((load, walkers.replicates) for walkers in case.walkers for load in contact_loads(case, walkers))
+    loads = (
+        (load, walkers.replicates)
+        for walkers in case.walkers
+        for load in contact_loads(case, walkers)
+    )
     return sum(load.surfaces.volume * replicates for load, replicates in loads)
 
 
@@ -166,7 +191,10 @@ def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
     """Loads of the contacts of a walker at rest."""
     contacts = [f"bead {bead} on substrate" for bead, _ in enumerate(walkers.radii, 1)]
     contacts += [f"bead {second + 1} on bead {first + 1}" for first, second in walkers.pairs]
-    planes = [capillary_force_limit_at_wall(case.liquid.surface_tension, radius) for radius in walkers.radii]
+    planes = [
+        capillary_force_limit_at_wall(case.liquid.surface_tension, radius)
+        for radius in walkers.radii
+    ]
     limits = [*planes, *(None for _ in walkers.pairs)]
     return [
         {
@@ -208,12 +236,29 @@ def describe(summary: dict[str, Any]) -> str:
         f"(g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {gravity:g} m/s²), "
         f"amplitude {drive['amplitude'] * 1e3:.4g} mm, peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
     )
-    rows = [["contact", "capillary force", "4πγR of a plane", "bridge volume", "rupture gap", "overlap at rest"]]
+    rows = [
+        [
+            "contact",
+            "capillary force",
+            "4πγR of a plane",
+            "bridge volume",
+            "rupture gap",
+            "overlap at rest",
+        ]
+    ]
     for contact in summary["contacts"]:
         limit = contact["capillary_force_limit"]
-        cells = [f"{contact['capillary_force'] * 1e6:.4g} µN", f"{limit * 1e6:.4g} µN" if limit else "-"]
-        cells += [f"{contact['bridge_volume'] * 1e12:.3g} nL", f"{contact['rupture_distance'] * 1e6:.3g} µm"]
-        rows.append([f"  {contact['contact']}", *cells, f"{contact['overlap_at_rest'] * 1e9:.4g} nm"])
+        cells = [
+            f"{contact['capillary_force'] * 1e6:.4g} µN",
+            f"{limit * 1e6:.4g} µN" if limit else "-",
+        ]
+        cells += [
+            f"{contact['bridge_volume'] * 1e12:.3g} nL",
+            f"{contact['rupture_distance'] * 1e6:.3g} µm",
+        ]
+        rows.append(
+            [f"  {contact['contact']}", *cells, f"{contact['overlap_at_rest'] * 1e9:.4g} nm"]
+        )
     lines += [aligned(rows, right=range(1, 6))] if summary["contacts"] else []
     notes = [f"note       {note}" for note in summary["notes"]]
     return "\n".join([*lines, *_text_of_run(summary["time_step"], summary["run"]), *notes])

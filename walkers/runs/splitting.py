@@ -26,9 +26,15 @@ def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) ->
     dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
     frames, x = dump.stack(), dump.columns.index("x")
     sampled = frames[:: next(iter(cases.values())).run.samples_per_cycle, :, x : x + 2]
-    centre = np.stack([sampled[:, np.array(walker.beads) - 1].mean(axis=1) for walker in layout.walkers], axis=1)
-    if came_near(centre, NEAR * max(make.length for case in cases.values() for make in case.walkers)):
-        raise WalkersMet("walkers of different cases came close to each other in a shared deck", directory)
+    centre = np.stack(
+        [sampled[:, np.array(walker.beads) - 1].mean(axis=1) for walker in layout.walkers], axis=1
+    )
+    if came_near(
+        centre, NEAR * max(make.length for case in cases.values() for make in case.walkers)
+    ):
+        raise WalkersMet(
+            "walkers of different cases came close to each other in a shared deck", directory
+        )
     owner, renumbered = (np.zeros(layout.atoms + 1, dtype=np.int64) for _ in range(2))
     walkers = iter(layout.walkers)
     for number, (place, case) in enumerate(cases.items()):

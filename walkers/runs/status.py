@@ -35,7 +35,10 @@ def worst_status(points: Iterable[str]) -> str:
     """Status of a sweep from its points: running, interrupted or failed if one is, in this order, or finished."""
     statuses = set(points)
     worst = {"running": "running", "missing": "interrupted", "failed": "failed"}
-    return next((status for status_of_point, status in worst.items() if status_of_point in statuses), "finished")
+    return next(
+        (status for status_of_point, status in worst.items() if status_of_point in statuses),
+        "finished",
+    )
 
 
 def state_at(place: Path, directory: Path | None = None) -> PointState:

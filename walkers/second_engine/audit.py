@@ -17,7 +17,10 @@ from walkers.second_engine.scenes import CHECKS, Bench
 
 
 def run_audit(
-    only: Collection[str] = (), *, engine: Engine | None = None, on_done: Callable[[str], None] | None = None
+    only: Collection[str] = (),
+    *,
+    engine: Engine | None = None,
+    on_done: Callable[[str], None] | None = None,
 ) -> tuple[list[Line], str]:
     """Run all `CHECKS` or some on an engine, the installed one if None is given: lines, and the engine's version.
 
@@ -40,5 +43,12 @@ def record(lines: Sequence[Line], engine: Engine, version: str) -> None:
     """
     if not any(line.verdict is Verdict.ERROR for line in lines):
         failed = [line.quantity for line in failures(lines)]
-        outcome = {"passed": not failed, "lines": len(lines), "failures": failed, "date": iso_time(time.time())}
-        write_audit(engine.sha256, {"contact_model": model_sha256(engine), "version": version, **outcome})
+        outcome = {
+            "passed": not failed,
+            "lines": len(lines),
+            "failures": failed,
+            "date": iso_time(time.time()),
+        }
+        write_audit(
+            engine.sha256, {"contact_model": model_sha256(engine), "version": version, **outcome}
+        )

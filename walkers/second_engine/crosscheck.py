@@ -68,7 +68,10 @@ def crosscheck(
     >>> [line for line in crosscheck(load_case("fig1b"), tmp) if line.failed]
     []
     """
-    cases = [changed_case(case, {"run.seed": case.run.seed + number} if number else {}) for number in range(seeds)]
+    cases = [
+        changed_case(case, {"run.seed": case.run.seed + number} if number else {})
+        for number in range(seeds)
+    ]
     motions = [run(start, out, progress=progress, engine=engine).motion for start in cases]
     return compare(motions, without)
 
@@ -79,14 +82,25 @@ def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Li
     pile, names = motions[0].case.mixture is not None, [*measured(motions[0])]
     sides = ([[*measured(motion).values()] for motion in side] for side in (motions, seconds))
     numbers = [np.mean(side, axis=0).tolist() for side in sides]
-    speeds = [abs(speed) for (_, unit), speed in zip(names, numbers[0], strict=True) if unit == "mm/s"]
+    speeds = [
+        abs(speed) for (_, unit), speed in zip(names, numbers[0], strict=True) if unit == "mm/s"
+    ]
     lines = []
     for (quantity, unit), first, second in zip(names, *numbers, strict=True):
         allowed = {"mm/s": max(GAIT * max(speeds), SPEED_FLOOR), "°": ORIENTATION}.get(unit, inf)
         if quantity.startswith("velocity"):
             allowed = max(SPEED * abs(first), SPEED_FLOOR)
         if unit != "%" or first or second:
-            lines.append(Line(quantity, first, second, inf if pile else allowed, unit, scale=None if pile else 1.0))
+            lines.append(
+                Line(
+                    quantity,
+                    first,
+                    second,
+                    inf if pile else allowed,
+                    unit,
+                    scale=None if pile else 1.0,
+                )
+            )
     check = f"{motions[0].case.name}: LIGGGHTS (expected) and the second engine (measured)"
     check += f" without {', '.join(without)}" if without else ""
     lines += [line for both in zip(motions, seconds, strict=True) for line in courses(*both)]
@@ -105,25 +119,41 @@ def measured(motion: Motion) -> dict[tuple[str, str], float]:
         touching = sum(int(np.sum(distances < radii)) for distances in apart)
         return {
             ("height of the beads", "mm"): 1e3 * float(late.position[..., 2].mean()),
-            ("root mean square velocity", "mm/s"): 1e3 * sqrt(float(np.sum(late.velocity**2, axis=-1).mean())),
+            ("root mean square velocity", "mm/s"): 1e3
+            * sqrt(float(np.sum(late.velocity**2, axis=-1).mean())),
             ("touching pairs per bead", ""): touching / late.position[..., 0].size,
         }
     if not motion.groups:
-        displacement = motion.radius**3 / np.sum(motion.radius**3) @ (motion.position[-1] - motion.position[0])
+        displacement = (
+            motion.radius**3 / np.sum(motion.radius**3) @ (motion.position[-1] - motion.position[0])
+        )
         speeds = (1e3 * displacement / np.ptp(motion.time)).tolist()
-        return {(f"centre of mass along {axis}", "mm/s"): speeds["xyz".index(axis)] for axis in "zyx"}
+        return {
+            (f"centre of mass along {axis}", "mm/s"): speeds["xyz".index(axis)] for axis in "zyx"
+        }
     numbers: dict[tuple[str, str], float] = {}
     for number, group in enumerate(motion.groups, 1):
         label = f" ({number})" if len(motion.groups) > 1 else ""
         beads = [f"bead {bead + 1}" for bead in range(len(group.radii))]
-        contacts = [*beads, *(f"beads {first + 1}-{second + 1}" for first, second in group.make.pairs)]
+        contacts = [
+            *beads,
+            *(f"beads {first + 1}-{second + 1}" for first, second in group.make.pairs),
+        ]
         numbers[f"velocity{label}", "mm/s"] = 1e3 * float(walk(group)["velocity"].mean())
-        gait, kinds = averages(group), (("rotation", beads), ("sliding", contacts), ("open", contacts))
+        gait, kinds = (
+            averages(group),
+            (("rotation", beads), ("sliding", contacts), ("open", contacts)),
+        )
         for quantity, places in kinds:
             factor, unit = (100.0, "%") if quantity == "open" else (1e3, "mm/s")
             means = (factor * getattr(gait, quantity).mean(axis=0)).tolist()
-            numbers |= {(f"{quantity} {place}{label}", unit): mean for place, mean in zip(places, means, strict=True)}
-        numbers[f"orientation at the end{label}", "°"] = degrees(float(group.orientation[-1].mean()))
+            numbers |= {
+                (f"{quantity} {place}{label}", unit): mean
+                for place, mean in zip(places, means, strict=True)
+            }
+        numbers[f"orientation at the end{label}", "°"] = degrees(
+            float(group.orientation[-1].mean())
+        )
     return numbers
 
 
@@ -135,10 +165,14 @@ def shortened(case: Case, cycles: int) -> Case:
     rare = case.run.cycles_per_sample
     least = 3 * rare
     if cycles < least or cycles % rare:
-        raise ValueError(f"expected at least {least}" + (f", a multiple of {rare}" if rare > 1 else ""))
+        raise ValueError(
+            f"expected at least {least}" + (f", a multiple of {rare}" if rare > 1 else "")
+        )
     lengths = ("cycles", "most_cycles", "duration", "settling_cycles")
     run = {key: value for key, value in case.document.get("run", {}).items() if key not in lengths}
-    return build_case({**case.document, "run": {**run, "cycles": cycles}}, source=case.name, name=case.name)
+    return build_case(
+        {**case.document, "run": {**run, "cycles": cycles}}, source=case.name, name=case.name
+    )
 
 
 def simulate(motion: Motion, without: Collection[str] = ()) -> Motion:
@@ -149,7 +183,13 @@ def simulate(motion: Motion, without: Collection[str] = ()) -> Motion:
     parts = [(first, np.zeros_like(motion.spin[:1])), *_advanced(engine, motion)]
     frames, spins = (np.concatenate([part[which] for part in parts]) for which in (0, 1))
     position, velocity, spin = (frames[..., column : column + 3] for column in (0, 3, 6))
-    return replace(motion, position=position, velocity=velocity, spin=spin, mean_spin=spins if motion.groups else None)
+    return replace(
+        motion,
+        position=position,
+        velocity=velocity,
+        spin=spin,
+        mean_spin=spins if motion.groups else None,
+    )
 
 
 def _advanced(engine: SecondEngine, motion: Motion) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -181,8 +221,16 @@ def full_cases() -> dict[str, Case]:
     """Walkers, climbers, clusters, other drives and walls, and a small pile."""
     alone = {"dimers.replicates": 2, "dimers.facing": "right"}
     walker, symmetric = (read_toml(shipped("case")[name]) for name in ("fig1b", "symmetric"))
-    fan = {"arrangement": "fan", "radii": ["0.3 mm", "0.2 mm", "0.2 mm"], "angle": "20 deg", "replicates": 2}
-    clusters = {**{name: table for name, table in walker.items() if name != "dimers"}, "clusters": [fan]}
+    fan = {
+        "arrangement": "fan",
+        "radii": ["0.3 mm", "0.2 mm", "0.2 mm"],
+        "angle": "20 deg",
+        "replicates": 2,
+    }
+    clusters = {
+        **{name: table for name, table in walker.items() if name != "dimers"},
+        "clusters": [fan],
+    }
     tones = [
         {"frequency": "80 Hz", "peak_acceleration": "4 g"},
         {"frequency": "160 Hz", "peak_acceleration": "3 g", "phase": "90 deg"},
@@ -191,9 +239,15 @@ def full_cases() -> dict[str, Case]:
         "alignment from 30°": (load_case("fig1b", {"dimers.angle": "30 deg", **alone}), 40),
         "symmetric from 30°": (load_case("symmetric", {"dimers.angle": "30 deg", **alone}), 40),
         "fan of three": (build_case(clusters, name="fig1b"), 24),
-        "two tones": (build_case({**symmetric, "drive": {"harmonics": tones}}, name="symmetric"), 24),
+        "two tones": (
+            build_case({**symmetric, "drive": {"harmonics": tones}}, name="symmetric"),
+            24,
+        ),
         "slope of 5°": (load_case("fig1b", {"boundary.tilt": "5 deg"}), 24),
-        "groove of 120°": (load_case("fig1b", {"boundary.shape": "groove", "boundary.opening": "120 deg"}), 24),
+        "groove of 120°": (
+            load_case("fig1b", {"boundary.shape": "groove", "boundary.opening": "120 deg"}),
+            24,
+        ),
         "climber": (load_case("climber"), 20),
         "cluster in a corner": (load_case("cluster"), 21),
         "pile-ci": (load_case("pile-ci"), 24),

@@ -55,13 +55,27 @@ class SecondEngine:
         radius = np.ascontiguousarray(radius, dtype=np.float64)
         self.constants = _constants(case, radius, walls or case.boundary.walls, without)
         place, velocity, spin = (
-            np.array(start[:, column : column + 3], dtype=np.float64, order="C") for column in (0, 3, 6)
+            np.array(start[:, column : column + 3], dtype=np.float64, order="C")
+            for column in (0, 3, 6)
         )
         beads = len(radius)
         contacts = (beads, beads + len(self.constants.point))
         self.state = State(
-            *(place, velocity, spin, np.zeros_like(place), np.zeros_like(place), np.ones(beads), np.zeros(beads)),
-            *(np.zeros((*contacts, 3)), np.full(contacts, -1), np.zeros((beads, beads), np.bool_), place.copy()),
+            *(
+                place,
+                velocity,
+                spin,
+                np.zeros_like(place),
+                np.zeros_like(place),
+                np.ones(beads),
+                np.zeros(beads),
+            ),
+            *(
+                np.zeros((*contacts, 3)),
+                np.full(contacts, -1),
+                np.zeros((beads, beads), np.bool_),
+                place.copy(),
+            ),
         )
         kernels.look_around(self.constants, self.state)
         self.evaluate()
@@ -80,7 +94,11 @@ class SecondEngine:
     def follow(self, frame: FloatArray) -> FloatArray:
         """Move the beads to a state (N, 9) at the next step; return forces (N) and torques (N m), (N, 6)."""
         state = self.state
-        state.position[:], state.velocity[:], state.spin[:] = frame[:, :3], frame[:, 3:6], frame[:, 6:]
+        state.position[:], state.velocity[:], state.spin[:] = (
+            frame[:, :3],
+            frame[:, 3:6],
+            frame[:, 6:],
+        )
         self.clock += 1
         kernels.look_around(self.constants, state)
         kernels.forces(self.constants, state, self.clock, True)
@@ -101,25 +119,36 @@ def _splined(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray
     middle = max(0.5 * end, 0.5 * (scale + end))
     t = np.linspace(0.0, 1.0, CELLS + 1)
     pieces = (scale * t, scale * (middle / scale) ** t, end - (end - middle) * (1.0 - t) ** 2)
-    splines = [CubicSpline(CELLS * t, curve.forces(gaps).columns()).c.transpose(1, 0, 2) for gaps in pieces]
+    splines = [
+        CubicSpline(CELLS * t, curve.forces(gaps).columns()).c.transpose(1, 0, 2) for gaps in pieces
+    ]
     return np.array([curve.formation, scale, middle, end]), np.stack(splines)
 
 
 def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridges:
     sizes, kind = np.unique(radius, return_inverse=True)
-    between, full = np.empty((len(sizes), len(sizes) + 1), dtype=np.int64), np.zeros((len(sizes), len(sizes) + 1, 2))
+    between, full = (
+        np.empty((len(sizes), len(sizes) + 1), dtype=np.int64),
+        np.zeros((len(sizes), len(sizes) + 1, 2)),
+    )
     tables: list[tuple[FloatArray, FloatArray, float]] = []
     for row, small in enumerate(sizes.tolist()):
         between[row, :row], full[row, :row] = between[:row, row], full[:row, row, ::-1]
         for column, large in list(enumerate([*sizes.tolist(), inf]))[row:]:
             surfaces = surfaces_of(case, small, large)
             between[row, column], full[row, column] = len(tables), surfaces.films[0]
-            tables += [(*_splined(case.law, meeting), meeting.volume) for meeting in surfaces.volumes]
-    acts = np.array(["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64)
+            tables += [
+                (*_splined(case.law, meeting), meeting.volume) for meeting in surfaces.volumes
+            ]
+    acts = np.array(
+        ["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64
+    )
     spans, splines, volumes = map(np.stack, zip(*tables, strict=True))
     liquid = 4.0 / 3.0 * pi * radius**3 * case.liquid.of_bridges.volume_fraction
     steps = 8 if case.liquid.conserved else 0
-    return Bridges(spans, splines * acts, kind.astype(np.int64), between, volumes, steps, full, liquid)
+    return Bridges(
+        spans, splines * acts, kind.astype(np.int64), between, volumes, steps, full, liquid
+    )
 
 
 def _rows_of(case: Case, walls: Sequence[Wall]) -> list[KernelRow]:
@@ -127,12 +156,17 @@ def _rows_of(case: Case, walls: Sequence[Wall]) -> list[KernelRow]:
     for wall in walls:
         row = wall.kernel_row()
         if row is None:
-            raise refused(case.name, "boundary.mesh: expected a vessel of planes; the second engine knows no facets")
+            raise refused(
+                case.name,
+                "boundary.mesh: expected a vessel of planes; the second engine knows no facets",
+            )
         rows.append(row)
     return rows
 
 
-def _constants(case: Case, radius: FloatArray, walls: Sequence[Wall], without: Collection[str]) -> Constants:
+def _constants(
+    case: Case, radius: FloatArray, walls: Sequence[Wall], without: Collection[str]
+) -> Constants:
     contact = case.contact
     modulus, ratio, loss = contact.youngs_modulus, contact.poissons_ratio, log(contact.restitution)
     damping, friction, rolling, gravity, drive = (term not in without for term in TERMS[2:])

@@ -156,7 +156,11 @@ def plus(a: Vector, scale: float, b: Vector) -> Vector:
 @compiled
 def bridge_forces(b: Bridges, bridge: int, gap: float) -> tuple[float, float, float, float, float]:
     """Pull (N) and resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s)."""
-    scale, middle, rupture = b.spans[bridge, SCALE], b.spans[bridge, MIDDLE], b.spans[bridge, RUPTURE]
+    scale, middle, rupture = (
+        b.spans[bridge, SCALE],
+        b.spans[bridge, MIDDLE],
+        b.spans[bridge, RUPTURE],
+    )
     gap = max(gap, 0.0)
     if gap < scale:
         piece, place = 0, gap / scale
@@ -172,7 +176,9 @@ def bridge_forces(b: Bridges, bridge: int, gap: float) -> tuple[float, float, fl
 
 
 @compiled
-def touch(c: Constants, m: Meeting, spring: FloatArray, moves: bool) -> tuple[float, Vector, Vector]:
+def touch(
+    c: Constants, m: Meeting, spring: FloatArray, moves: bool
+) -> tuple[float, Vector, Vector]:
     """Normal force (N), tangential force (N) and couple (N m) on the first of two surfaces that overlap.
 
     The ``spring`` (m) changes if time advances (``moves``); otherwise it keeps its length.
@@ -219,7 +225,9 @@ def meet(c: Constants, m: Meeting, spring: FloatArray, moves: bool) -> tuple[Vec
 
 
 @compiled
-def push(state: State, bead: int, sign: float, arm: float, n: Vector, acting: tuple[Vector, Vector]) -> None:
+def push(
+    state: State, bead: int, sign: float, arm: float, n: Vector, acting: tuple[Vector, Vector]
+) -> None:
     """A force (N) and a couple (N m), or their reaction (``sign`` -1), on a bead, ``arm`` (m) from the contact."""
     force, couple = acting
     turn = cross(n, force)
@@ -235,7 +243,9 @@ def separation(c: Constants, state: State, i: int, j: int) -> tuple[Vector, floa
     if wall < 0:
         away = plus(place, -1.0, vector(state.position[j]))
         distance = sqrt(dot(away, away))
-        return (away[0] / distance, away[1] / distance, away[2] / distance), distance - (c.radius[i] + c.radius[j])
+        return (away[0] / distance, away[1] / distance, away[2] / distance), distance - (
+            c.radius[i] + c.radius[j]
+        )
     away, n = plus(place, -1.0, vector(c.point[wall])), vector(c.normal[wall])
     if c.hollow[wall] == 0.0:
         return n, dot(away, n) - c.radius[i]
@@ -256,7 +266,11 @@ def bridge_of(b: Bridges, state: State, i: int, j: int, held: int, gap: float) -
     if held < 0:
         held = b.between[kinds]
         first, second = b.full[kinds]
-        offers = (first * state.film[i], 0.0) if wall else (first * state.offered[i], second * state.offered[j])
+        offers = (
+            (first * state.film[i], 0.0)
+            if wall
+            else (first * state.offered[i], second * state.offered[j])
+        )
         if b.steps:
             part = (offers[0] + offers[1]) / (first + second)
             level = round(2.0 * log2(part)) if part > 0.0 else -b.steps - 1
@@ -295,7 +309,11 @@ def forces(c: Constants, state: State, clock: int, moves: bool) -> None:
     if clock >= 0:
         for number in range(c.harmonics.shape[0]):
             wave = c.harmonics[number]
-            total = plus(total, wave[4] * sin(wave[3] * clock * c.step + wave[5]), (wave[0], wave[1], wave[2]))
+            total = plus(
+                total,
+                wave[4] * sin(wave[3] * clock * c.step + wave[5]),
+                (wave[0], wave[1], wave[2]),
+            )
         if c.course.shape[0]:
             total = plus(total, 1.0, vector(c.course[clock]))
     for bead in range(beads):
@@ -314,7 +332,13 @@ def forces(c: Constants, state: State, clock: int, moves: bool) -> None:
                     continue
             arm, spin = c.radius[i] + 0.5 * gap, vector(state.spin[i])
             between, turn, turning = vector(state.velocity[i]), spin, plus(NONE, arm, spin)
-            radius, mass, friction, order, other_arm = c.radius[i], c.mass[i], c.friction_walls, 1.0, 0.0
+            radius, mass, friction, order, other_arm = (
+                c.radius[i],
+                c.mass[i],
+                c.friction_walls,
+                1.0,
+                0.0,
+            )
             if j < beads:
                 other_arm, other_spin = c.radius[j] + 0.5 * gap, vector(state.spin[j])
                 between = plus(between, -1.0, vector(state.velocity[j]))

@@ -90,7 +90,11 @@ def run_checks(
             on_done(name)
         return [replace(line, check=name) for line in lines]
 
-    return [line for lines in mapped(lines_of, [name for name in checks if name in only or not only]) for line in lines]
+    return [
+        line
+        for lines in mapped(lines_of, [name for name in checks if name in only or not only])
+        for line in lines
+    ]
 
 
 def failures(lines: Iterable[Line]) -> list[Line]:
@@ -100,9 +104,12 @@ def failures(lines: Iterable[Line]) -> list[Line]:
 
 def as_text(lines: Sequence[Line], of: str = "") -> str:
     """A table below the name of each check, and the number of lines that pass, after the words ``of``."""
-    tables = [f"{check}\n{_table(rows)}\n" for check, rows in groupby(lines, lambda line: line.check)]
+    tables = [
+        f"{check}\n{_table(rows)}\n" for check, rows in groupby(lines, lambda line: line.check)
+    ]
     passed, failed, unknown = (
-        sum(line.verdict is verdict for line in lines) for verdict in (Verdict.PASS, Verdict.FAIL, Verdict.ERROR)
+        sum(line.verdict is verdict for line in lines)
+        for verdict in (Verdict.PASS, Verdict.FAIL, Verdict.ERROR)
     )
     outcome = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
     outcome += f", {unknown} could not be measured" if unknown else ""
@@ -112,8 +119,14 @@ def as_text(lines: Sequence[Line], of: str = "") -> str:
 def _table(lines: Iterable[Line]) -> str:
     rows = [["", "", "expected", "measured"]]
     for line in lines:
-        judged = f"error {line.error:.1e} of {line.tolerance:.0e}" if isfinite(line.error + line.tolerance) else ""
-        pair = [f"{value:.6g}" if isfinite(value) else "-" for value in (line.expected, line.measured)]
+        judged = (
+            f"error {line.error:.1e} of {line.tolerance:.0e}"
+            if isfinite(line.error + line.tolerance)
+            else ""
+        )
+        pair = [
+            f"{value:.6g}" if isfinite(value) else "-" for value in (line.expected, line.measured)
+        ]
         rows.append([line.verdict, line.quantity, *pair, line.unit, judged])
     return aligned([[*row, "", ""][:6] for row in rows], right=(2, 3))
 

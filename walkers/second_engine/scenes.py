@@ -62,7 +62,9 @@ def dry(surfaces: Surfaces) -> Curve:
 def law(surfaces: Surfaces) -> Curve:
     """A bridge that forms before surfaces touch, with a kink near contact, and resistances of all kinds."""
     size, scale = surfaces.reduced_radius, surfaces.roughness
-    uneven = 1.0 - surfaces.radius / surfaces.other_radius  # none of equal beads, which have no order
+    uneven = (
+        1.0 - surfaces.radius / surfaces.other_radius
+    )  # none of equal beads, which have no order
     drag = 6.0 * pi * 0.03 * size
 
     def forces(gaps: FloatArray) -> Forces:
@@ -84,7 +86,11 @@ _BARE = {
     "liquid": {"surface_tension": "19.2 mN/m", "dynamic_viscosity": "0 Pa*s"},
     "boundary": {"material": "glass"},
     "contact": {
-        **{"friction": {"bead_bead": 0.0, "bead_wall": 0.0}, "rolling_friction": 0.0, "restitution": 1.0},
+        **{
+            "friction": {"bead_bead": 0.0, "bead_wall": 0.0},
+            "rolling_friction": 0.0,
+            "restitution": 1.0,
+        },
         **{"roughness": {"bead_bead": "2 um", "bead_wall": "2 um"}, "youngs_modulus": "50 MPa"},
     },
     "drive": {"frequency": "80 Hz", "peak_acceleration": "0 g", "frame": "container"},
@@ -108,7 +114,14 @@ def full_case(changes: Mapping[str, Any]) -> Case:
     return bench_case({**_FULL, **changes})
 
 
-def over(wall: Flat, gap: float, radius: float, velocity: Vector = STILL, spin: Vector = SPIN, x: float = 0.0) -> Bead:
+def over(
+    wall: Flat,
+    gap: float,
+    radius: float,
+    velocity: Vector = STILL,
+    spin: Vector = SPIN,
+    x: float = 0.0,
+) -> Bead:
     """A bead at a gap (m) from a wall, at a distance along x (m) from the point of the wall."""
     centre = [at + (radius + gap) * n for at, n in zip(wall.point, wall.normal, strict=True)]
     return Bead(0, (centre[0] + x, centre[1], centre[2]), radius, velocity, spin)
@@ -118,11 +131,20 @@ def within(wall: Round, gap: float, radius: float, turn: float, velocity: Vector
     """A bead at a gap (m) from a cylindrical wall at an azimuth (rad); velocity: radial, azimuthal, axial."""
     out, (away, along, up) = wall.radius - radius - gap, velocity
     x, y = cos(turn), sin(turn)
-    return Bead(0, (out * x, out * y, 10.0 * turn * R), radius, (away * x - along * y, away * y + along * x, up), SPIN)
+    return Bead(
+        0,
+        (out * x, out * y, 10.0 * turn * R),
+        radius,
+        (away * x - along * y, away * y + along * x, up),
+        SPIN,
+    )
 
 
 def pair(
-    gap: float, apart: float, slide: Vector, spins: tuple[Vector, Vector] = (SPIN, (-29.0, 53.0, 19.0))
+    gap: float,
+    apart: float,
+    slide: Vector,
+    spins: tuple[Vector, Vector] = (SPIN, (-29.0, 53.0, 19.0)),
 ) -> list[Bead]:
     """Two free beads of different sizes at a gap (m), with a separation velocity and a common velocity (m/s)."""
     n = np.array([0.48, 0.6, 0.64])
@@ -153,7 +175,11 @@ def standing(beads: Sequence[Bead], walls: Sequence[Wall] = (FLOOR,)) -> Scene:
 def recording(steps: int, sample_every: int = 1) -> dict[str, Any]:
     """Options of a plan that records beads with their forces and torques, and bridges at the start and the end."""
     every = {"sample_every": sample_every, "bridge_every": steps, "status_every": steps}
-    return {"segment": Segment(0, steps, 0), **every, "bead_columns": (*BEAD_COLUMNS, *FORCE_COLUMNS)}
+    return {
+        "segment": Segment(0, steps, 0),
+        **every,
+        "bead_columns": (*BEAD_COLUMNS, *FORCE_COLUMNS),
+    }
 
 
 def prescribed(case: Case, scene: Scene, steps: int = 2000, **options: Any) -> Plan:
@@ -199,9 +225,14 @@ class Bench:
         self.version = launch(deck, directory, self.engine, on_step=self._look).version
         dump = BinaryDump(directory / deck.layout.bead_dump, deck.layout.bead_columns)
         beads = dump.stack()
-        vectors = [beads[:, :, dump.columns.index(name) :][:, :, :3] for name in ("x", "vx", "omegax", "fx", "tqx")]
+        vectors = [
+            beads[:, :, dump.columns.index(name) :][:, :, :3]
+            for name in ("x", "vx", "omegax", "fx", "tqx")
+        ]
         time = dump.steps.astype(np.float64) * deck.layout.time_step
-        return Measured(time, np.concatenate(vectors[:3], -1), np.concatenate(vectors[3:], -1), directory)
+        return Measured(
+            time, np.concatenate(vectors[:3], -1), np.concatenate(vectors[3:], -1), directory
+        )
 
     def _look(self, _: int) -> None:
         if self.stop.is_set():
@@ -239,7 +270,10 @@ class Setting:
             series = bench.run(prescribed(case, scene))
             forces = np.array([engine.follow(frame) for frame in in_walls(case, series)])
             parts = {"force": slice(0, 3), "torque": slice(3, 6)}
-            pairs = {quantity: (series.forces[1:, :, part], forces[..., part]) for quantity, part in parts.items()}
+            pairs = {
+                quantity: (series.forces[1:, :, part], forces[..., part])
+                for quantity, part in parts.items()
+            }
         for quantity, both in pairs.items():
             yield Line(f"{name}: {quantity}, both engines", 0.0, farthest(*both), EQUAL)
 
@@ -249,7 +283,9 @@ def in_walls(case: Case, series: Measured) -> FloatArray:
     frames = series.frames[1:].copy()
     frames[..., :3] -= prescribed_motion(case.excitation, series.time[1:])[0][:, None]
     # Velocities of beads and walls are from half a step before.
-    frames[..., 3:6] -= prescribed_motion(case.excitation, series.time[1:] - 0.5 * case.run.time_step)[1][:, None]
+    frames[..., 3:6] -= prescribed_motion(
+        case.excitation, series.time[1:] - 0.5 * case.run.time_step
+    )[1][:, None]
     return frames
 
 
@@ -280,14 +316,22 @@ SCENES: dict[str, Setting] = {
     ),
     "a bead leaves a tilted wall": Setting([over(_LEANING, -DEEP, R, WAY)], [_LEANING]),
     "beads leave a cylindrical wall": Setting(
-        [within(_ROUND, -DEEP, size, turn, (-0.05, 0.03, 0.02)) for size, turn in ((R, 0.7), (S, 3.0))], [_ROUND]
+        [
+            within(_ROUND, -DEEP, size, turn, (-0.05, 0.03, 0.02))
+            for size, turn in ((R, 0.7), (S, 3.0))
+        ],
+        [_ROUND],
     ),
     "beads move along a cylindrical wall": Setting(
-        [within(_ROUND, -DEEP, R, 0.3, (-0.02, 0.3, 0.0)), within(_ROUND, 1e-5, S, 2.0, (0.0, -0.4, 0.1))],
+        [
+            within(_ROUND, -DEEP, R, 0.3, (-0.02, 0.3, 0.0)),
+            within(_ROUND, 1e-5, S, 2.0, (0.0, -0.4, 0.1)),
+        ],
         [FLOOR, _ROUND],
     ),
     "a bead in a corner": Setting(
-        [Bead(0, (1e-4, 6.0e-4 - R + DEEP, R - DEEP), R, (0.031, -0.043, 0.037), SPIN)], [FLOOR, _SIDE]
+        [Bead(0, (1e-4, 6.0e-4 - R + DEEP, R - DEEP), R, (0.031, -0.043, 0.037), SPIN)],
+        [FLOOR, _SIDE],
     ),
     "pairs separate, of either order, approach, and roll on each other": Setting(
         [
@@ -332,13 +376,18 @@ SCENES: dict[str, Setting] = {
 
 def restart_lines(bench: Bench) -> Iterator[Line]:
     """Springs and open bridges of pairs and walls continue from a restart file as in an uninterrupted run."""
-    beads = [over(FLOOR, -DEEP, R, (0.002, 0.001, 0.0), STILL), *pair(-DEEP, 0.001, (0.001, -0.002, 0.001))]
+    beads = [
+        over(FLOOR, -DEEP, R, (0.002, 0.001, 0.0), STILL),
+        *pair(-DEEP, 0.001, (0.001, -0.002, 0.001)),
+    ]
     leaving = replace(over(FLOOR, -DEEP, S, WAY), centre=(3e-3, 0.0, S - DEEP))
     scene = standing([*beads, leaving, *moved(pair(-DEEP, 0.04, STILL), 0.0, 3e-3)])
     whole = bench.run(prescribed(full_case({}), scene, 1000))
     first = prescribed(full_case({}), scene, 500, restart_to="half.restart")
     carry = bench.run(first).directory / "half.restart"
-    second = replace(first, segment=Segment(500, 1000, 0), restart_to=None, restart_from="half.restart")
+    second = replace(
+        first, segment=Segment(500, 1000, 0), restart_to=None, restart_from="half.restart"
+    )
     forces = bench.run(second, carry).forces[1:, :, :3]
     kept = ("wall spring", 0), ("pair spring", 1), ("open wall bridge", 3), ("open pair bridge", 5)
     for quantity, number in kept:
@@ -352,25 +401,44 @@ def rank_lines(bench: Bench) -> Iterator[Line]:
     first, last = pair(-DEEP, 0.01, STILL)
     crossing = [*moved([first, last], 2.6e-3, 0.0, 0.9), *moved([last, first], 2.6e-3, 2e-3, 0.9)]
     scene = standing([*CLIMBING, *crossing])
-    single, double = (bench.run(prescribed(full_case({}), scene, 1000, ranks=ranks)).forces for ranks in (1, 2))
-    yield Line("forces: two MPI ranks and one", 0.0, farthest(double[..., :3], single[..., :3]), 1e-9)
-    yield Line("torques: two MPI ranks and one", 0.0, farthest(double[..., 3:], single[..., 3:]), 1e-9)
+    single, double = (
+        bench.run(prescribed(full_case({}), scene, 1000, ranks=ranks)).forces for ranks in (1, 2)
+    )
+    yield Line(
+        "forces: two MPI ranks and one", 0.0, farthest(double[..., :3], single[..., :3]), 1e-9
+    )
+    yield Line(
+        "torques: two MPI ranks and one", 0.0, farthest(double[..., 3:], single[..., 3:]), 1e-9
+    )
 
 
 def stock_lines(bench: Bench) -> Iterator[Line]:
     """Two beads separate: Debian's own ``cohesion easo/capillary/viscous`` against the contact model's Soulié law."""
-    liquid = {"liquid.dynamic_viscosity": "4.6 mPa*s", "liquid.contact_angle": "20 deg", "liquid.law": "soulie"}
+    liquid = {
+        "liquid.dynamic_viscosity": "4.6 mPa*s",
+        "liquid.contact_angle": "20 deg",
+        "liquid.law": "soulie",
+    }
     bare = bench_case({**liquid, "contact.restitution": 0.5})
     scene = standing(pair(-DEEP, 0.05, STILL, (STILL, STILL)))
     deck = compose(prescribed(bare, scene))
     meeting = surfaces_of(bare, S, R)
     fine = tabulated(by_name(bare.liquid.law), meeting, tolerance=1e-10).text()
     tables = deck.files[BRIDGES_NAME].split("bridge ")
-    tables = [f"1 1 {S!r} {R!r}\n{fine}" if table.startswith(f"1 1 {S!r} {R!r}") else table for table in tables]
+    tables = [
+        f"1 1 {S!r} {R!r}\n{fine}" if table.startswith(f"1 1 {S!r} {R!r}") else table
+        for table in tables
+    ]
     ours = bench.run(replace(deck, files={**deck.files, BRIDGES_NAME: "bridge ".join(tables)}))
     angle = degrees(sqrt(2.0 * bare.liquid.contact_angle))
     closest = meeting.roughness / meeting.reduced_radius
-    given = {"case": bare, "scene": scene, "layout": deck.layout, "angle": angle, "closest": closest}
+    given = {
+        "case": bare,
+        "scene": scene,
+        "layout": deck.layout,
+        "angle": angle,
+        "closest": closest,
+    }
     text = rendered("walkers.second_engine", "stock.lig.j2", **given)
     theirs = bench.run(replace(deck, text=text))
     error = farthest(ours.forces[..., :3], theirs.forces[..., :3])
@@ -383,7 +451,9 @@ def liquid_lines(bench: Bench, ranks: int = 1) -> Iterator[Line]:
     liquid = {"liquid.volume_fraction": 0.02, "liquid.law": "willett"}  # whose tables take no time
     case = bench_case(liquid).put("liquid.conserved", True)
     radii = draw.choice([2e-4, 2.5e-4, 3e-4], 16)
-    start = np.column_stack([draw.uniform(-8e-4, 8e-4, (16, 2)), radii + draw.uniform(-3e-5, 8e-5, 16)])
+    start = np.column_stack(
+        [draw.uniform(-8e-4, 8e-4, (16, 2)), radii + draw.uniform(-3e-5, 8e-5, 16)]
+    )
     velocity = np.column_stack([draw.uniform(-0.3, 0.3, (16, 2)), draw.uniform(-0.03, 0.03, 16)])
     places, speeds = map(tuple, start.tolist()), map(tuple, velocity.tolist())
     beads = [Bead(0, *bead) for bead in zip(places, radii.tolist(), speeds, strict=True)]
@@ -397,14 +467,18 @@ def liquid_lines(bench: Bench, ranks: int = 1) -> Iterator[Line]:
     dump = BinaryDump(series.directory / "beads.bin", plan.bead_columns).stack()
     away = float(np.abs(dump[:, :, -1] - films).max())
     yield Line("films of beads that meet and part, both engines", 0.0, away, 1e-9)
-    yield Line("liquid at the end over liquid at the start", 1.0, engine.liquid() / everything, 1e-9)
+    yield Line(
+        "liquid at the end over liquid at the start", 1.0, engine.liquid() / everything, 1e-9
+    )
     yield Line("smallest film", 0.0, float(np.min(films)))
     yield Line("largest film", 1.0, float(np.max(films)))
 
 
 def company_lines(bench: Bench) -> Iterator[Line]:
     """A walker in a shared deck against the same walker in a deck of its own; and a repeated run."""
-    alone = load_case("fig1b", {"dimers.replicates": 1, "contact.rolling_friction": 0.0})  # which amplifies rounding
+    alone = load_case(
+        "fig1b", {"dimers.replicates": 1, "contact.rolling_friction": 0.0}
+    )  # which amplifies rounding
     alone = alone.but(run=alone.run.but(cycles=10, cycles_per_segment=10, until_steady=False))
     stronger = alone.put("drive.peak_acceleration", 2.0 * alone.excitation.peak_acceleration)
     sloping = alone.put("boundary.tilt", 0.3)
@@ -413,15 +487,21 @@ def company_lines(bench: Bench) -> Iterator[Line]:
         return bench.run(replace(plan_of(*cases), bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS)))
 
     first, again, together = ran(alone), ran(alone), ran(stronger, alone, sloping)
-    displacements = [series.frames[..., :3] - series.frames[0, :, :3] for series in (first, together)]
+    displacements = [
+        series.frames[..., :3] - series.frames[0, :, :3] for series in (first, together)
+    ]
     error = farthest(displacements[1][:, 2:4], displacements[0][:, :2])
     yield Line("displacement of a walker: shared deck and own deck", 0.0, error, 1e-9)
-    same = (first.directory / "beads.bin").read_bytes() == (again.directory / "beads.bin").read_bytes()
+    same = (first.directory / "beads.bin").read_bytes() == (
+        again.directory / "beads.bin"
+    ).read_bytes()
     yield Line("a repeated run is bit-identical (0: yes)", 0.0, float(not same), 0.0)
 
 
 CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
-    "scenes": lambda bench: (line for name, setting in SCENES.items() for line in setting.lines(name, bench)),
+    "scenes": lambda bench: (
+        line for name, setting in SCENES.items() for line in setting.lines(name, bench)
+    ),
     "restart": restart_lines,
     "ranks": rank_lines,
     "stock": stock_lines,

@@ -37,7 +37,15 @@ _TIMES = (1.0, 4.0, 16.0, 64.0, 256.0)
 """Young's moduli, divided by the modulus of the case. A run with the largest one takes 16 times as long."""
 _LEAST_INCREASE = 1.25
 """Of the modulus, to the largest of a case."""
-_FAMILIES = ("velocity", "right_facing", "left_facing", "axial_", "lateral_", "rotation_", "sliding_")
+_FAMILIES = (
+    "velocity",
+    "right_facing",
+    "left_facing",
+    "axial_",
+    "lateral_",
+    "rotation_",
+    "sliding_",
+)
 """Beginnings of the names of numbers that have a numerical error, all in m/s."""
 
 
@@ -70,18 +78,30 @@ def measure_accuracy(
     numbers = recorded(directory)["numbers"]
     for last in range(min(2, len(possible) - 1), len(possible)):
         sweep = _sweep(case, f"{directory.name}{ACCURACY}", possible[: last + 1])
-        record, failures = run_sweep(sweep, directory.parent, options, engine=engine, on_progress=on_progress)
+        record, failures = run_sweep(
+            sweep, directory.parent, options, engine=engine, on_progress=on_progress
+        )
         if failures:
             raise SweepStopped(f"{failures[0].run}: {failures[0].message}")
         table = table_of(record).frame
         # The largest share of a headline velocity that the last increase of the modulus changes.
-        names = {main_columns(table)[0], *(SIDES if case.goes_uphill or sides_differ(table) else ())}
+        names = {
+            main_columns(table)[0],
+            *(SIDES if case.goes_uphill or sides_differ(table) else ()),
+        }
         harder = [numbers, *table[1:].to_dict("records")]
         before, after = harder[max(last - 1, 0)], harder[last]
-        changes = (abs(after[name] - before[name]) / max(abs(after[name]), STEADY_SPEED) for name in names)
+        changes = (
+            abs(after[name] - before[name]) / max(abs(after[name]), STEADY_SPEED) for name in names
+        )
         if (change := float(max(filter(isfinite, changes)))) < SHARE:
             break
-    accuracy = {"sweep": record.sweep.name, "share": SHARE, "reached": change < SHARE, "change": change}
+    accuracy = {
+        "sweep": record.sweep.name,
+        "share": SHARE,
+        "reached": change < SHARE,
+        "change": change,
+    }
     accuracy |= {"times": possible[last], "errors": _errors(numbers, table.iloc[0], harder[last])}
     with recomputed(directory, [ACCURACY_NAME]):
         write_json(directory / ACCURACY_NAME, accuracy)
@@ -105,14 +125,18 @@ def _sweep(case: Case, name: str, possible: Sequence[float]) -> Sweep:
     factors = [(0.5, 1.0), *((times**-0.5, times) for times in possible[1:])]
     points = {
         "run.time_step": [f"{shorter * step!r} us" for shorter, _ in factors],
-        "contact.youngs_modulus": [f"{min(harder * modulus, 1e-6 * STIFFEST)!r} MPa" for _, harder in factors],
+        "contact.youngs_modulus": [
+            f"{min(harder * modulus, 1e-6 * STIFFEST)!r} MPa" for _, harder in factors
+        ],
     }
     title = f"{case.title or case.name}: smaller time steps and harder beads"
     file = {"title": title, "case": case.name, "zip": [points]}
     return expand(file, source=case.name, name=name, base=(case.name, case.document))
 
 
-def _errors(row: Mapping[str, Any], finer: pd.Series, hardest: Mapping[Any, Any]) -> dict[str, dict[str, float]]:
+def _errors(
+    row: Mapping[str, Any], finer: pd.Series, hardest: Mapping[Any, Any]
+) -> dict[str, dict[str, float]]:
     """Numerical errors of a row, by one with half its step and one with the hardest beads."""
     errors = {}
     for name in row:

@@ -23,7 +23,14 @@ from walkers.errors import refused
 from walkers.files import write_bytes
 from walkers.postprocess.measure.results import Results, plain
 from walkers.postprocess.measure.uncertainty import guesses
-from walkers.postprocess.show.drawing import TWO_COLUMNS, letter_panels, new_figure, plain_text, save_figure, styled
+from walkers.postprocess.show.drawing import (
+    TWO_COLUMNS,
+    letter_panels,
+    new_figure,
+    plain_text,
+    save_figure,
+    styled,
+)
 from walkers.rounding import percent
 from walkers.sweeps.table import SEEDS, groups, key_texts
 from walkers.text import aligned
@@ -42,7 +49,11 @@ _WALLS_OF_CORNER = 2
 _ROW = 2.1  # inches
 _ALIKE = 1e-6  # relative difference below which lengths of runs are equal
 _LETTERS = 44  # of a line in labels of conditions
-_KINDS = {"all": ("", "ko"), "plain walls": ("on_plain_walls", "C1s"), "corners": ("in_corners", "C2^")}
+_KINDS = {
+    "all": ("", "ko"),
+    "plain walls": ("on_plain_walls", "C1s"),
+    "corners": ("in_corners", "C2^"),
+}
 """All climbs and their parts: key of `summarise_climbs`, colour and marker."""
 
 
@@ -56,11 +67,19 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
 
     done = frame[frame["status"] == "finished"]
     if done.empty:
-        raise refused(frame.attrs["sweep"], "expected a finished run of a pile: no point is finished")
+        raise refused(
+            frame.attrs["sweep"], "expected a finished run of a pile: no point is finished"
+        )
     sets = [rows for _, rows in groups(done)]
-    texts = pd.concat([key_texts(rows.head(1)) for rows in sets]).drop(columns=list(SEEDS), errors="ignore")
+    texts = pd.concat([key_texts(rows.head(1)) for rows in sets]).drop(
+        columns=list(SEEDS), errors="ignore"
+    )
     most = {key: column.mode().tolist() for key, column in texts.items()}
-    usual = {key: values for key, values in most.items() if 2 * (texts[key] == values[0]).sum() >= len(texts)}
+    usual = {
+        key: values
+        for key, values in most.items()
+        if 2 * (texts[key] == values[0]).sum() >= len(texts)
+    }
     for rows, values in zip(sets, texts.to_dict("records") or [{}], strict=True):
         unusual = [f"{key} = {text}" for key, text in values.items() if [text] != usual.get(key)]
         yield ", ".join(unusual), rows
@@ -77,15 +96,23 @@ def summarise_climbs(results: Sequence[Results], within: float | None = None) ->
     for result in results:
         if "climbs" not in result:
             raise refused(result.directory, "expected a finished run of a pile")
-    piles = pd.DataFrame([{name: result[name] for name in ("beads", "large", "driven")} for result in results])
-    climbs = pd.concat([result.table("clusters").assign(pile=pile) for pile, result in enumerate(results)])
+    piles = pd.DataFrame(
+        [{name: result[name] for name in ("beads", "large", "driven")} for result in results]
+    )
+    climbs = pd.concat(
+        [result.table("clusters").assign(pile=pile) for pile, result in enumerate(results)]
+    )
     climbs = climbs[climbs["climbed"].astype(bool)]
-    records: Any = climbs.assign(run=[results[pile].directory.name for pile in climbs["pile"]]).to_dict("records")
+    records: Any = climbs.assign(
+        run=[results[pile].directory.name for pile in climbs["pile"]]
+    ).to_dict("records")
     guessed = guesses(results[0].about["rests_on"])
     return {**summary(piles, climbs, within), "each": list(map(plain, records)), "guessed": guessed}
 
 
-def summary(piles: pd.DataFrame, climbs: pd.DataFrame, within: float | None = None) -> dict[str, Any]:
+def summary(
+    piles: pd.DataFrame, climbs: pd.DataFrame, within: float | None = None
+) -> dict[str, Any]:
     """`statistics` of all climbs, and of each of `PARTS` by the same time.
 
     Its default is the end of the shortest run without a climb: the longest time at which all runs count.
@@ -96,7 +123,10 @@ def summary(piles: pd.DataFrame, climbs: pd.DataFrame, within: float | None = No
     cut = inf if within is None else within
     in_corners = climbs["walls"] >= _WALLS_OF_CORNER
     parts = (~in_corners, in_corners, climbs["out_of_pile"].astype(bool))
-    of_parts = {name: statistics(piles, climbs[rows], cut, at) for name, rows in zip(PARTS, parts, strict=True)}
+    of_parts = {
+        name: statistics(piles, climbs[rows], cut, at)
+        for name, rows in zip(PARTS, parts, strict=True)
+    }
     return statistics(piles, climbs, cut, at) | of_parts
 
 
@@ -143,7 +173,9 @@ def _rate(events: int, seconds: float) -> dict[str, Any]:
     if seconds <= 0.0:
         return {"rate": None, "rate_interval": None}
     tail = (1.0 - _CONFIDENCE) / 2.0
-    ends = chi2.ppf((tail, 1.0 - tail), (2 * events, 2 * events + 2)) / 2.0  # NaN: no lower end without events
+    ends = (
+        chi2.ppf((tail, 1.0 - tail), (2 * events, 2 * events + 2)) / 2.0
+    )  # NaN: no lower end without events
     return {"rate": events / seconds, "rate_interval": (np.nan_to_num(ends) / seconds).tolist()}
 
 
@@ -157,7 +189,10 @@ def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:
     draw, led = np.random.default_rng(0), int(climbs["leader_large"].sum())
     drawn = np.zeros(_DRAWS)
     for pile, rows in climbs.groupby("pile"):
-        beads, left = piles["beads"][pile], np.full(_DRAWS, piles["large"][pile])  # labels "large" for further leaders
+        beads, left = (
+            piles["beads"][pile],
+            np.full(_DRAWS, piles["large"][pile]),
+        )  # labels "large" for further leaders
         for place, weight in enumerate(rows["leader"].value_counts().sort_index()):
             is_large = draw.random(_DRAWS) < left / (beads - place)
             drawn += weight * is_large
@@ -193,7 +228,10 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
     climbed, ended = int((~censored & (first <= at)).sum()), int((censored & ~long_enough).sum())
     interval, estimator = None, "Clopper-Pearson"
     if ended and probability is not None and 0.0 < probability < 1.0:
-        interval, estimator = [float(end.evaluate(at)) for end in (band.low, band.high)], "Kaplan-Meier"
+        interval, estimator = (
+            [float(end.evaluate(at)) for end in (band.low, band.high)],
+            "Kaplan-Meier",
+        )
     elif probability is not None:
         followed = int((long_enough | (first <= np.minimum(watched, at))).sum())
         interval = [*map(float, binomtest(climbed, followed).proportion_ci(_CONFIDENCE))]
@@ -210,7 +248,8 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
         "estimator": estimator,
         "median": float(half[0]) if len(half) else None,
         "curve": {
-            name: [value if isfinite(value) else None for value in line.tolist()] for name, line in curve.items()
+            name: [value if isfinite(value) else None for value in line.tolist()]
+            for name, line in curve.items()
         },
     }
 
@@ -218,7 +257,9 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
 def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
     """Statistics of climbs in a condition as texts; rates in climbs per run and second, 95 % intervals in brackets."""
 
-    def with_interval(value: float | None, ends: Sequence[float] | None, digits: str = ".2g") -> str:
+    def with_interval(
+        value: float | None, ends: Sequence[float] | None, digits: str = ".2g"
+    ) -> str:
         interval = "" if ends is None else f" ({ends[0]:{digits}} to {ends[1]:{digits}})"
         return "–" if value is None else f"{value:{digits}}{interval}"
 
@@ -235,16 +276,23 @@ def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
         "climbs": f"{climbs['climbs']}",
         "rate": with_interval(climbs["rate"], climbs["rate_interval"]),
         **{
-            name.replace("_", " "): with_interval(climbs[name]["rate"], climbs[name]["rate_interval"]) for name in PARTS
+            name.replace("_", " "): with_interval(
+                climbs[name]["rate"], climbs[name]["rate_interval"]
+            )
+            for name in PARTS
         },
         "dispersion": "–" if climbs["dispersion"] is None else f"{climbs['dispersion']:.2g}",
         "led by large": f"{climbs['led_by_large']} of {climbs['climbs']}",
         "large beads (%)": f"{100.0 * climbs['share_of_large']:.0f}",
-        "p by chance": "–" if climbs["p_among_beads"] is None else f"{max(climbs['p_among_beads'], 2.0 / _DRAWS):.2g}",
+        "p by chance": "–"
+        if climbs["p_among_beads"] is None
+        else f"{max(climbs['p_among_beads'], 2.0 / _DRAWS):.2g}",
         "beads": between(climbs["sizes"]),
         "height (mm)": between(climbs["heights"], 1e3),
         "speed (mm/s)": between(climbs["speeds"], 1e3),
-        "median speed (mm/s)": f"{1e3 * np.median(climbs['speeds']):.2g}" if climbs["speeds"] else "–",
+        "median speed (mm/s)": f"{1e3 * np.median(climbs['speeds']):.2g}"
+        if climbs["speeds"]
+        else "–",
         "guessed": ", ".join(climbs.get("guessed", [])) or "–",
     }
 
@@ -252,7 +300,9 @@ def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
 def describe_climbs(climbs: Sequence[Mapping[str, Any]]) -> str:
     """`texts_of` conditions, one below the other, without what does not exist, such as speeds if nothing climbed."""
     texts = map(texts_of, climbs)
-    blocks = [aligned([[name, text] for name, text in of_one.items() if text != "–"]) for of_one in texts]
+    blocks = [
+        aligned([[name, text] for name, text in of_one.items() if text != "–"]) for of_one in texts
+    ]
     note = f"rates per run and second; in brackets {percent(_CONFIDENCE)} confidence"
     return "\n\n".join([*blocks, note])
 
@@ -268,7 +318,13 @@ def table_of(climbs: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
             for name, value in (condition[key] if key else condition).items():
                 if name.endswith("interval"):
                     quantity = name.removesuffix("interval").strip("_") or "probability"
-                    row |= dict(zip((f"{quantity}_low", f"{quantity}_high"), value or (np.nan, np.nan), strict=True))
+                    row |= dict(
+                        zip(
+                            (f"{quantity}_low", f"{quantity}_high"),
+                            value or (np.nan, np.nan),
+                            strict=True,
+                        )
+                    )
                 elif not isinstance(value, (dict, list)):
                     row[name] = value
             rows.append(row)
@@ -285,24 +341,40 @@ def climbs_figure(climbs: Sequence[Mapping[str, Any]]) -> Figure:
     """
     heights = [1.0, 0.3 + len(climbs) / 6.0]
     mosaic = [["survival", "climbs"], ["rates", "rates"]]
-    figure, axes = new_figure(TWO_COLUMNS, _ROW * sum(heights), mosaic=mosaic, height_ratios=heights)
+    figure, axes = new_figure(
+        TWO_COLUMNS, _ROW * sum(heights), mosaic=mosaic, height_ratios=heights
+    )
     curve = climbs[0]["curve"]
-    time, share, low, high = (np.array(curve[name], dtype=float) for name in ("time", "probability", "low", "high"))
+    time, share, low, high = (
+        np.array(curve[name], dtype=float) for name in ("time", "probability", "low", "high")
+    )
     axes["survival"].step(time, share, "k", where="post")
     axes["survival"].fill_between(time, low, high, step="post", color="0.85")
     axes["survival"].set(
-        xlabel="time of drive (s)", ylabel="share that has climbed", ylim=(0.0, 1.02), xlim=(0.0, None)
+        xlabel="time of drive (s)",
+        ylabel="share that has climbed",
+        ylim=(0.0, 1.02),
+        xlim=(0.0, None),
     )
     risen = [climb for climb in climbs[0]["each"] if climb["speed"] is not None]
     for where, (key, look) in list(_KINDS.items())[1:]:
         of_kind = [climb for climb in risen if _is_in_corner(climb) == (key == "in_corners")]
-        sizes, speeds = [climb["size"] for climb in of_kind], [climb["speed"] * 1e3 for climb in of_kind]
-        looks = {"markerfacecolor": "none", "clip_on": False, "in_layout": False}  # without climbs a layout would fail
+        sizes, speeds = (
+            [climb["size"] for climb in of_kind],
+            [climb["speed"] * 1e3 for climb in of_kind],
+        )
+        looks = {
+            "markerfacecolor": "none",
+            "clip_on": False,
+            "in_layout": False,
+        }  # without climbs a layout would fail
         axes["climbs"].plot(sizes, speeds, look, label=where, **looks)
     axes["climbs"].set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
     _draw_rates(axes["rates"], table_of(climbs))
     letter_panels(axes.values())
-    figure.legend(*axes["rates"].get_legend_handles_labels(), loc="outside lower center", ncols=len(_KINDS))
+    figure.legend(
+        *axes["rates"].get_legend_handles_labels(), loc="outside lower center", ncols=len(_KINDS)
+    )
     return figure
 
 
@@ -316,9 +388,14 @@ def _draw_rates(panel: Axes, table: pd.DataFrame) -> None:
     first = table[table["where"] == "all"]
     for number, (where, (_, look)) in enumerate(_KINDS.items()):
         rows = table[table["where"] == where]
-        at, rates = np.arange(len(rows)) + 0.2 * (number - 1), rows["rate"].astype(float)  # NaN without a drive
+        at, rates = (
+            np.arange(len(rows)) + 0.2 * (number - 1),
+            rows["rate"].astype(float),
+        )  # NaN without a drive
         errors = [rates - rows["rate_low"], rows["rate_high"] - rates]
-        panel.errorbar(rates, at, xerr=errors, fmt=look, label=where, linestyle="none", markersize=3.0)
+        panel.errorbar(
+            rates, at, xerr=errors, fmt=look, label=where, linestyle="none", markersize=3.0
+        )
     # With the last word of each key, such as ``frequency 100 Hz``.
     named = [re.sub(r"[\w.\[\]]*?(\w+) = ", r"\1 ", condition) for condition in first["condition"]]
     climbed = zip(named, first["climbed"], first["runs"], strict=True)

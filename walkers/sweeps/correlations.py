@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def rank_correlations(done: pd.DataFrame, column: str, keys: Sequence[str]) -> dict[str, float] | None:
+def rank_correlations(
+    done: pd.DataFrame, column: str, keys: Sequence[str]
+) -> dict[str, float] | None:
     """Rank correlations of a column with drawn keys, the strongest first, if larger than two standard errors.
 
     Points without a number and walkers that came apart do not count. None if the draws are too few (`few_draws`).

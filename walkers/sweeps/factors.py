@@ -180,4 +180,6 @@ def numbers_of(rows: pd.DataFrame, name: str, option: str) -> Factor:
     values = pd.to_numeric(rows[name], errors="coerce").to_numpy(dtype=float, na_value=np.nan)
     if len(rows) and np.isnan(values).all():
         raise refused(option, f'"{name}" has no number that could be drawn')
-    return Factor((name,), readable_key(name), (values * factor).tolist(), is_number=True, unit=unit)
+    return Factor(
+        (name,), readable_key(name), (values * factor).tolist(), is_number=True, unit=unit
+    )

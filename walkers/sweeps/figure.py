@@ -15,7 +15,14 @@ import numpy.typing as npt
 from walkers.errors import expected_of, refused
 from walkers.inputs.resolving.library import unmeasured
 from walkers.postprocess.measure.numbers import draws_text
-from walkers.postprocess.show.drawing import TWO_COLUMNS, errors_seen, letter_panels, new_figure, plain_text, styled
+from walkers.postprocess.show.drawing import (
+    TWO_COLUMNS,
+    errors_seen,
+    letter_panels,
+    new_figure,
+    plain_text,
+    styled,
+)
 from walkers.runs.status import status_text
 from walkers.sweeps.correlations import rank_correlations
 from walkers.sweeps.factors import Factor
@@ -24,7 +31,15 @@ from walkers.sweeps.layout import Layout, layout_of
 from walkers.sweeps.left_out import tell
 from walkers.sweeps.predictions import Predict, Theory
 from walkers.sweeps.scales import scale_x, scale_y
-from walkers.sweeps.series import Series, aside_of, draw_legend, draw_series, draw_theory, looks_of, points_of
+from walkers.sweeps.series import (
+    Series,
+    aside_of,
+    draw_legend,
+    draw_series,
+    draw_theory,
+    looks_of,
+    points_of,
+)
 from walkers.sweeps.table import FACING_DOWN, SweepTable, default_column, find_name
 
 if TYPE_CHECKING:
@@ -46,7 +61,9 @@ _ONE_PANEL = 4.2
 """Height of a figure of one panel, inches."""
 
 
-def figure_of(table: SweepTable, options: FigureOptions = FigureOptions(), predict: Predict | None = None) -> Figure:
+def figure_of(
+    table: SweepTable, options: FigureOptions = FigureOptions(), predict: Predict | None = None
+) -> Figure:
     """Figure of the table of a sweep, with the predictions of a theory if there is one.
 
     Bars are the scatter over copies where the table has it. Without y, on slopes where the walkers
@@ -90,7 +107,9 @@ def _tell_left_out(frame: pd.DataFrame, done: pd.DataFrame, column: str) -> None
     counts = Counter(frame["status"][frame["status"] != "finished"])
     unfinished = status_text(counts)
     if done.empty:
-        raise refused(str(frame.attrs["sweep"]), f"no point is finished ({unfinished or 'there is none'})")
+        raise refused(
+            str(frame.attrs["sweep"]), f"no point is finished ({unfinished or 'there is none'})"
+        )
     if counts:
         tell(f"{counts.total()} of {len(frame)} points left out: {unfinished}")
     empty = int(done[column].isna().sum())
@@ -114,7 +133,13 @@ class _Panel:
 
 @styled
 def _draw(
-    done: pd.DataFrame, column: str, layout: Layout, theory: Theory | None, *, down: str | None, log: str
+    done: pd.DataFrame,
+    column: str,
+    layout: Layout,
+    theory: Theory | None,
+    *,
+    down: str | None,
+    log: str,
 ) -> Figure:
     """Draw a column of the finished points."""
     label, points = points_of(done, column, down)

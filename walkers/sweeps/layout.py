@@ -40,7 +40,9 @@ class Layout:
     hidden: Sequence[Factor] = ()
 
 
-def layout_of(table: pd.DataFrame, rows: pd.DataFrame, options: FigureOptions = FigureOptions()) -> Layout:
+def layout_of(
+    table: pd.DataFrame, rows: pd.DataFrame, options: FigureOptions = FigureOptions()
+) -> Layout:
     """The layout of a figure of some rows of a sweep's table.
 
     Without options, the x axis has the key with the most numbers, or of a sample each key in a
@@ -97,7 +99,9 @@ def _factors_of_rows(table: pd.DataFrame, rows: pd.DataFrame) -> list[Factor]:
     return varying or factors
 
 
-def _chosen(option: str, name: str | None, factors: Sequence[Factor], rows: pd.DataFrame) -> Factor | None:
+def _chosen(
+    option: str, name: str | None, factors: Sequence[Factor], rows: pd.DataFrame
+) -> Factor | None:
     """The factor of a key or a column that an option names; None without a name."""
     if name is None or (name == NONE and option != "x"):
         return None
@@ -148,9 +152,14 @@ def _hides(layout: Layout, hidden: Sequence[str]) -> InputError:
         shown.append(f"{layout.hue.keys[0]} (hue)")
     if layout.panels:
         shown.append(f"{layout.panels.keys[0]} (panels)")
-    vary = f"{', '.join(hidden)} {'varies' if len(hidden) == 1 else 'vary'} beside {', '.join(shown)}"
+    vary = (
+        f"{', '.join(hidden)} {'varies' if len(hidden) == 1 else 'vary'} beside {', '.join(shown)}"
+    )
     if layout.panels:
-        return refused("hue", f"{vary}: expected fewer keys in the sweep file, or none to draw all values alike")
+        return refused(
+            "hue",
+            f"{vary}: expected fewer keys in the sweep file, or none to draw all values alike",
+        )
     if len(hidden) > 1:
         advice = "expected one of them, with the others fixed in the sweep file"
     else:

@@ -153,7 +153,9 @@ def _with_number(case: Case, key: str, value: float, unit: str) -> Case:
     return changed_case(case, {key: int(value) if value.is_integer() else value})
 
 
-def _shown(done: pd.DataFrame, column: str, predicted: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+def _shown(
+    done: pd.DataFrame, column: str, predicted: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
     """Predictions in the displayed unit of a column."""
     factor = factor_shown(done, column)
     return {model: factor * values for model, values in predicted.items()}

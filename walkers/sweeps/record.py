@@ -44,7 +44,12 @@ def write_record(record: SweepRecord) -> None:
     """Write ``sweep.json`` into the sweep's directory, which is made if necessary."""
     make_folder(record.directory)
     sweep = record.sweep
-    contents = {"format": _FORMAT, "file": dict(sweep.file), "case": sweep.case_name, "base": dict(sweep.base)}
+    contents = {
+        "format": _FORMAT,
+        "file": dict(sweep.file),
+        "case": sweep.case_name,
+        "base": dict(sweep.base),
+    }
     write_json(record.directory / RECORD_NAME, {**contents, "runs": list(record.runs)})
 
 
@@ -58,15 +63,21 @@ def read_record(directory: str | Path) -> SweepRecord:
         if contents["format"] != _FORMAT:
             raise ValueError(f"its format is {contents['format']!r}, expected {_FORMAT}")
         base = contents["case"], contents["base"]
-        sweep = expand(contents["file"], source=f"{named}/{RECORD_NAME}", name=directory.name, base=base)
+        sweep = expand(
+            contents["file"], source=f"{named}/{RECORD_NAME}", name=directory.name, base=base
+        )
         runs = contents["runs"]
         if len(runs) != len(sweep.rows) or not all(isinstance(run, str) for run in runs):
             raise ValueError(f"{len(runs)} runs, expected the names of {len(sweep.rows)}")
         return SweepRecord(directory, sweep, runs)
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise refused(named, f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2") from error
+        raise refused(
+            named, f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"
+        ) from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        text = f"{RECORD_NAME} cannot be read ({error}); run the sweep again: finished runs are kept"
+        text = (
+            f"{RECORD_NAME} cannot be read ({error}); run the sweep again: finished runs are kept"
+        )
         raise refused(named, text) from error
 
 

@@ -42,7 +42,9 @@ def named_in(out: Path, places: Sequence[Path]) -> list[Removal]:
     runs_of = {entry.name: entry.runs or () for entry in contents if entry.kind == "sweep"}
     going = _with_members(names, runs_of)
     members = going - names
-    removed = [entry for entry in contents if entry.directory in directories or entry.name in members]
+    removed = [
+        entry for entry in contents if entry.directory in directories or entry.name in members
+    ]
     return [_removal_of(entry, going, runs_of) for entry in removed]
 
 
@@ -84,7 +86,9 @@ def _with_members(names: Collection[str], runs_of: Mapping[str, Collection[str]]
         going |= members
 
 
-def _removal_of(entry: Entry, going: Collection[str], runs_of: Mapping[str, Collection[str]]) -> Removal:
+def _removal_of(
+    entry: Entry, going: Collection[str], runs_of: Mapping[str, Collection[str]]
+) -> Removal:
     """The removal of a run or a sweep; `InputError` if a process is computing the run."""
     if entry.kind == "sweep":
         remark = "a symbolic link: its target stays"
@@ -94,7 +98,9 @@ def _removal_of(entry: Entry, going: Collection[str], runs_of: Mapping[str, Coll
     if not is_removable(entry):
         raise refused(entry.name, "expected a run that is not in progress")
     removal = removal_of(entry)
-    needed_by = [sweep for sweep, runs in runs_of.items() if sweep not in going and entry.name in runs]
+    needed_by = [
+        sweep for sweep, runs in runs_of.items() if sweep not in going and entry.name in runs
+    ]
     if needed_by:
         text = f"needed by the sweep {needed_by[0]}, which would run it again"
         removal = replace(removal, remark=text)

@@ -49,7 +49,9 @@ def report_sweep(table: SweepTable, path: Path) -> Path:
     svg, left_out = _figure(table)
     rests: dict[str, dict[str, Any]] = {}
     for result in table.results.values():
-        rests |= {rest["key"]: rest for rest in result.about["rests_on"] if rest["key"] not in frame}
+        rests |= {
+            rest["key"]: rest for rest in result.about["rests_on"] if rest["key"] not in frame
+        }
     cells, same = cells_of(frame.drop(columns="run"), readable_key)
     body = fill(
         "sweep.html.j2",

@@ -20,7 +20,14 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Collection, Hashable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    wait,
+)
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -38,13 +45,31 @@ from walkers.progress import Progress, Tell
 from walkers.rounding import counted, duration_text
 from walkers.runner.audit import check_audit
 from walkers.runner.binary import Engine, find_engine
-from walkers.runner.cost import PROGRAM_SECONDS, pairs_of_beads, predicted_overhead, predicted_seconds
+from walkers.runner.cost import (
+    PROGRAM_SECONDS,
+    pairs_of_beads,
+    predicted_overhead,
+    predicted_seconds,
+)
 from walkers.runner.directory import is_finished, is_locked, run_place, unfinished
-from walkers.runner.failures import DiskFull, EngineDiffers, EngineFailure, OutputGone, ProgramDiffers
+from walkers.runner.failures import (
+    DiskFull,
+    EngineDiffers,
+    EngineFailure,
+    OutputGone,
+    ProgramDiffers,
+)
 from walkers.runner.launch import cores_here
 from walkers.runs.making import make_runs, progress_at
 from walkers.runs.status import PointState, status_text
-from walkers.sweeps.record import RECORD_NAME, UNREADABLE, SweepRecord, read_record, states, write_record
+from walkers.sweeps.record import (
+    RECORD_NAME,
+    UNREADABLE,
+    SweepRecord,
+    read_record,
+    states,
+    write_record,
+)
 from walkers.sweeps.site import check_path, decks_at, prepare
 from walkers.templates.placement import sharing_key
 from walkers.text import with_unit
@@ -103,7 +128,10 @@ class Options:
         """The same options for decks with a number of MPI processes; `InputError` if a node has fewer cores."""
         options = replace(self, ranks=ranks)
         if not options.decks_at_once:
-            raise refused("cores", f"a deck has {ranks} MPI processes (run.ranks), more than the cores of a node")
+            raise refused(
+                "cores",
+                f"a deck has {ranks} MPI processes (run.ranks), more than the cores of a node",
+            )
         return options
 
 
@@ -146,7 +174,9 @@ class PlannedDeck:
     seconds: float
 
 
-def pack(cases: Sequence[Case], workers: int, longest_seconds: float = LONGEST_SECONDS) -> list[PlannedDeck]:
+def pack(
+    cases: Sequence[Case], workers: int, longest_seconds: float = LONGEST_SECONDS
+) -> list[PlannedDeck]:
     """Pack points into decks for a number of workers; the longest decks come first.
 
     The predicted time of a deck of several points is at most ``longest_seconds``.
@@ -173,9 +203,13 @@ def _parted(group: Sequence[int], cases: Sequence[Case], longest: float) -> list
     def is_possible(points: int) -> bool:
         walkers = points * most_walkers
         seconds = predicted_seconds(cases[group[0]], walkers)  # a group shares the number of steps
-        return points == 1 or (points <= MOST_POINTS and walkers <= MOST_WALKERS and seconds <= longest)
+        return points == 1 or (
+            points <= MOST_POINTS and walkers <= MOST_WALKERS and seconds <= longest
+        )
 
-    parts = next(parts for parts in range(1, len(group) + 1) if is_possible(ceil(len(group) / parts)))
+    parts = next(
+        parts for parts in range(1, len(group) + 1) if is_possible(ceil(len(group) / parts))
+    )
     return [_deck(part, cases) for part in _parts(group, parts)]
 
 
@@ -199,7 +233,9 @@ def makespan(seconds: Iterable[float], workers: int) -> float:
     return max(ends)
 
 
-def unfinished_parts(points: Sequence[int], cases: Sequence[Case], finished: Collection[int]) -> list[PlannedDeck]:
+def unfinished_parts(
+    points: Sequence[int], cases: Sequence[Case], finished: Collection[int]
+) -> list[PlannedDeck]:
     """The unfinished part of a deck: the deck itself, or its largest halves, quarters, … without a finished point.
 
     A deck that fails is repeated as two halves. So the same decks are left whenever the sweep is interrupted.
@@ -207,7 +243,13 @@ def unfinished_parts(points: Sequence[int], cases: Sequence[Case], finished: Col
     done = [number in finished for number in points]
     if not any(done):
         return [_deck(points, cases)]
-    return [] if all(done) else [deck for half in _parts(points, 2) for deck in unfinished_parts(half, cases, finished)]
+    return (
+        []
+        if all(done)
+        else [
+            deck for half in _parts(points, 2) for deck in unfinished_parts(half, cases, finished)
+        ]
+    )
 
 
 @dataclass(frozen=True)
@@ -235,7 +277,10 @@ class SweepPlan:
     @property
     def core_seconds(self) -> float:
         """Predicted CPU time of all processes for the missing points, s."""
-        decks = (deck.seconds * max(self.cases[point].run.ranks for point in deck.points) for deck in self.decks)
+        decks = (
+            deck.seconds * max(self.cases[point].run.ranks for point in deck.points)
+            for deck in self.decks
+        )
         return sum(decks) + self.overhead
 
     def as_text(self) -> str:
@@ -245,7 +290,9 @@ class SweepPlan:
         whole = PROGRAM_SECONDS + self.core_seconds
         apart = besides + sum(predicted_seconds(case) * case.run.ranks for case in missing)
         # Python works for one deck at a time, while other engines run.
-        until = max(makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides)
+        until = max(
+            makespan((deck.seconds for deck in self.decks), at_once) + PROGRAM_SECONDS, besides
+        )
         keys = ", ".join(with_unit(key, unit) for key, unit in record.sweep.units.items())
         return "\n".join(
             [
@@ -287,8 +334,12 @@ def plan_sweep(
     cases = _resolved(sweep, on_progress or (lambda _: None))
     options = options.for_ranks(max(case.run.ranks for case in cases))
     if sweep.until_below is not None and not any(case.walkers for case in cases):
-        raise InputError(sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")])
-    record = SweepRecord(out / sweep.name, sweep, [run_place(case, binary, out).name for case in cases])
+        raise InputError(
+            sweep.source, [Problem("descend", None, "expected walkers: a pile has no velocity")]
+        )
+    record = SweepRecord(
+        out / sweep.name, sweep, [run_place(case, binary, out).name for case in cases]
+    )
     if options.site is not None:
         check_path(record.directory)
     point_states = states(record)
@@ -299,10 +350,14 @@ def plan_sweep(
     longest = min(LONGEST_SECONDS, 0.5 * (options.time_limit or inf))
     packed = pack(cases, options.decks_at_once, longest)
     decks = [part for deck in packed for part in unfinished_parts(deck.points, cases, settled)]
-    return SweepPlan(record, cases, binary, decks, [state.status for state in point_states], options, final)
+    return SweepPlan(
+        record, cases, binary, decks, [state.status for state in point_states], options, final
+    )
 
 
-def _failures(record: SweepRecord, states: Sequence[PointState], reasons: Collection[str]) -> list[Failure]:
+def _failures(
+    record: SweepRecord, states: Sequence[PointState], reasons: Collection[str]
+) -> list[Failure]:
     points = enumerate(zip(record.runs, states, strict=True))
     return [
         Failure(point, run, state.reason or "", state.message or "", str(state.directory))
@@ -348,7 +403,9 @@ def run_sweep(
     if not (record.directory / RECORD_NAME).is_file():
         raise OutputGone(record.directory)
     if list(read_record(record.directory).runs) != list(record.runs):
-        raise SweepStopped(f"{record.directory} was replaced by another sweep of the same name; the runs are kept")
+        raise SweepStopped(
+            f"{record.directory} was replaced by another sweep of the same name; the runs are kept"
+        )
     return record, [*failures, *_failures(record, states(record, results=True), [UNREADABLE])]
 
 
@@ -378,9 +435,13 @@ def work(
         look()
         local = find_engine(str(engine.path))
         if local.sha256 != engine.sha256:
-            raise EngineDiffers(f"the engine on {node()}, {local.path}, is not the engine that started this sweep")
+            raise EngineDiffers(
+                f"the engine on {node()}, {local.path}, is not the engine that started this sweep"
+            )
         if list(runs) != [run_place(case, local, out).name for case in cases]:
-            raise ProgramDiffers(f"the program on {node()} has another version than the one that started the sweep")
+            raise ProgramDiffers(
+                f"the program on {node()} has another version than the one that started the sweep"
+            )
         return [*make_runs(cases, out, local, dumps=dumps, on_progress=look, time_limit=time_limit)]
     except (OSError, WalkersError) as error:
         kind: type[Exception] = type(error)
@@ -399,7 +460,9 @@ def work(
 
 
 @contextmanager
-def _workers(options: Options, record: SweepRecord) -> Iterator[tuple[Executor, threading.Event | None]]:
+def _workers(
+    options: Options, record: SweepRecord
+) -> Iterator[tuple[Executor, threading.Event | None]]:
     """The executor of a sweep, and the event that stops its threads; threads and Parsl's workers end with it."""
     if options.executor is not None:
         yield options.executor, None
@@ -418,7 +481,9 @@ def _workers(options: Options, record: SweepRecord) -> Iterator[tuple[Executor, 
     folder = record.directory / "parsl"  # its scripts and logs
     try:
         kernel = DataFlowKernel(prepare(options.site, folder, options.ranks))
-    except Exception as error:  # any class: an address that this machine does not have, ports in use
+    except (
+        Exception
+    ) as error:  # any class: an address that this machine does not have, ports in use
         text = " ".join(str(error).split())
         text = f"Parsl cannot start ({text}); see {folder}, and the address in the site file"
         raise SweepStopped(text) from error
@@ -440,7 +505,9 @@ def _report_of(future: Future[Report]) -> Report:
         from parsl.executors.errors import BadStateException
 
         if isinstance(error, BadStateException):
-            first = " ".join(str(error).partition("Error 2:")[0].split())  # the other errors repeat the first
+            first = " ".join(
+                str(error).partition("Error 2:")[0].split()
+            )  # the other errors repeat the first
             raise SweepStopped(f"the cluster's jobs fail: {first}") from error
         if isinstance(error, ParslError):
             text = str(error) or repr(error)
@@ -453,9 +520,13 @@ class _Loop:
         self.plan, self.record, self.executor, self.stop = plan, plan.record, executor, stop
         self.failures = list(plan.final)
         self.decks: dict[Future[Report], PlannedDeck] = {}  # submitted
-        self.halves: list[PlannedDeck] = []  # second halves of failed decks, while no point is finished
+        self.halves: list[
+            PlannedDeck
+        ] = []  # second halves of failed decks, while no point is finished
         self.shares: dict[PlannedDeck, float] = {}  # of running decks, that are done
-        self.alone: Counter[tuple[str, str]] = Counter()  # failures of points alone, by name and message
+        self.alone: Counter[tuple[str, str]] = (
+            Counter()
+        )  # failures of points alone, by name and message
         self.begin, self.seconds = time.perf_counter(), sum(deck.seconds for deck in plan.decks)
         self.finished_before = self.done = plan.statuses.count("finished")
 
@@ -483,7 +554,10 @@ class _Loop:
 
     def _submit(self, deck: PlannedDeck) -> None:
         plan = self.plan
-        runs, cases = [self.record.runs[point] for point in deck.points], [plan.cases[point] for point in deck.points]
+        runs, cases = (
+            [self.record.runs[point] for point in deck.points],
+            [plan.cases[point] for point in deck.points],
+        )
         how = (self.record.out, plan.engine, plan.options.time_limit, plan.options.dumps)
         self.decks[self.executor.submit(work, self.stop, runs, cases, *how)] = deck
 
@@ -497,7 +571,9 @@ class _Loop:
         if failure and len(left) == 1:
             self.failures.append(replace(failure, point=left[0], run=self.record.runs[left[0]]))
         elif left:  # without a failure another process was making these points
-            first, *second = (_deck(part, self.plan.cases) for part in _parts(left, 2 if failure else 1))
+            first, *second = (
+                _deck(part, self.plan.cases) for part in _parts(left, 2 if failure else 1)
+            )
             self._submit(first)
             self.halves += second
 
@@ -506,24 +582,47 @@ class _Loop:
         at_first = self.done == self.finished_before
         alike = (failure.reason, failure.cause)
         if failure.hits == "every point" or (failure.hits == "all at first" and at_first):
-            raise SweepStopped(f"{failure.message}; this would hit every point, and the sweep is stopped")
+            raise SweepStopped(
+                f"{failure.message}; this would hit every point, and the sweep is stopped"
+            )
         self.alone[alike] += alone
-        if self.alone[alike] >= _MOST_ALIKE and at_first and failure.hits != "one point":  # not by its parameters
-            text = f"the first {_MOST_ALIKE} points failed in the same way, and the sweep is stopped"
+        if (
+            self.alone[alike] >= _MOST_ALIKE and at_first and failure.hits != "one point"
+        ):  # not by its parameters
+            text = (
+                f"the first {_MOST_ALIKE} points failed in the same way, and the sweep is stopped"
+            )
             raise SweepStopped(f"{failure.cause}; {text}")
 
     def _progress(self) -> Progress:
-        first = list(self.decks.values())[: 4 * self.plan.options.decks_at_once]  # later decks have not started
-        decks = [deck for deck in first if is_locked(self.record.out / self.record.runs[deck.points[0]])]
-        running, points, failed = sum(len(deck.points) for deck in decks), len(self.record.runs), len(self.failures)
+        first = list(self.decks.values())[
+            : 4 * self.plan.options.decks_at_once
+        ]  # later decks have not started
+        decks = [
+            deck for deck in first if is_locked(self.record.out / self.record.runs[deck.points[0]])
+        ]
+        running, points, failed = (
+            sum(len(deck.points) for deck in decks),
+            len(self.record.runs),
+            len(self.failures),
+        )
         words = [f"{self.done} of {points} points done, {running} running, {failed} failed"]
         for deck in decks:  # between the segments of a run nothing is known
             first_point = deck.points[0]
-            at = progress_at(self.record.out / self.record.runs[first_point], self.plan.cases[first_point])
+            at = progress_at(
+                self.record.out / self.record.runs[first_point], self.plan.cases[first_point]
+            )
             self.shares[deck] = max(self.shares.get(deck, 0.0), at.share if at else 0.0)
-        left = [deck.seconds * (1.0 - self.shares.get(deck, 0.0)) for deck in (*self.decks.values(), *self.halves)]
+        left = [
+            deck.seconds * (1.0 - self.shares.get(deck, 0.0))
+            for deck in (*self.decks.values(), *self.halves)
+        ]
         share = max(0.0, 1.0 - sum(left) / self.seconds) if self.seconds else 1.0
-        words.append("measuring" if running and share >= _MEASURING else f"{100.0 * share:.0f} % of the work")
+        words.append(
+            "measuring" if running and share >= _MEASURING else f"{100.0 * share:.0f} % of the work"
+        )
         if 0.0 < share < 1.0:
-            words.append(f"{duration_text((1.0 / share - 1.0) * (time.perf_counter() - self.begin))} left")
+            words.append(
+                f"{duration_text((1.0 / share - 1.0) * (time.perf_counter() - self.begin))} left"
+            )
         return Progress(share, ", ".join(words))

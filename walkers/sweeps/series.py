@@ -139,7 +139,9 @@ def aside_of(number: int, count: int) -> float:
     return (number - (count - 1) / 2.0) * distance
 
 
-def draw_series(axes: Axes, series: Series, points: pd.DataFrame, look: Mapping[str, Any], *, joined: bool) -> None:
+def draw_series(
+    axes: Axes, series: Series, points: pd.DataFrame, look: Mapping[str, Any], *, joined: bool
+) -> None:
     """Draw points with error bars, bands, and the points of walkers that face down.
 
     Parameters
@@ -158,7 +160,9 @@ def draw_series(axes: Axes, series: Series, points: pd.DataFrame, look: Mapping[
     shown = points.iloc[series.rows]
     bars = shown["error"] if errors_seen(points["error"], points["value"]) else None
     line = "-" if series.is_line and joined else "none"
-    axes.errorbar(series.places, shown["value"].to_numpy(), yerr=bars, capsize=2, lw=0.9, ls=line, **look)
+    axes.errorbar(
+        series.places, shown["value"].to_numpy(), yerr=bars, capsize=2, lw=0.9, ls=line, **look
+    )
     if "low" in shown:
         _draw_band(axes, series, shown, look["color"])
     if "down" in shown:
@@ -172,7 +176,9 @@ def _draw_band(axes: Axes, series: Series, shown: pd.DataFrame, colour: Any) -> 
     low = shown["low"].to_numpy()
     high = shown["high"].to_numpy()
     if series.is_line:
-        axes.fill_between(series.places, low, high, color=colour, alpha=_BAND_OPACITY, zorder=0.5, lw=0.0)
+        axes.fill_between(
+            series.places, low, high, color=colour, alpha=_BAND_OPACITY, zorder=0.5, lw=0.0
+        )
     else:
         axes.vlines(series.places, low, high, color=colour, alpha=_BAND_OPACITY, zorder=0.5, lw=4.0)
 

@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 _GUARDED = ("setsid", "setpriv", "--pdeathsig", "TERM")
 """Prefix of the command that starts Parsl's interchange. Ctrl-C must not end the interchange, because Parsl waits for
 its last message. If the sweep is killed, the interchange must end, so that the pilots notice and end, too."""
-_MOST_LOSSES = 5  # repetitions of a deck whose worker was lost (a cancelled job, a node that went down)
+_MOST_LOSSES = (
+    5  # repetitions of a deck whose worker was lost (a cancelled job, a node that went down)
+)
 # SLURM replaces patterns such as %N in paths; a job whose output cannot be written ends at once.
 _ODD = re.compile(r"[^\w./+@=,:-]")
 _TAKEN = "letters, digits and . _ / + @ = , : -"
@@ -106,7 +108,9 @@ def load_site(path: str | Path) -> Config:
     try:
         config = runpy.run_path(str(path)).get("config")
     except Exception as error:  # whatever the user's file raises
-        raise refused(path, f"cannot be used: {type(error).__name__}: {' '.join(str(error).split())}") from error
+        raise refused(
+            path, f"cannot be used: {type(error).__name__}: {' '.join(str(error).split())}"
+        ) from error
     if not isinstance(config, Config):
         raise refused(path, "expected a configuration: config = parsl.Config(...)")
     return config
@@ -114,9 +118,15 @@ def load_site(path: str | Path) -> Config:
 
 def check_path(folder: Path) -> None:
     """Refuse a sweep's folder with a space, a quote or the like in it: Parsl writes it into shell scripts unquoted."""
-    for source, text in (("out", str(folder.parent.resolve())), (printable(folder.name), folder.name)):
+    for source, text in (
+        ("out", str(folder.parent.resolve())),
+        (printable(folder.name), folder.name),
+    ):
         if odd := _ODD.search(text):
-            raise refused(source, f"with a site file expected {_TAKEN} in the path, found {odd[0]!r} in {text!r}")
+            raise refused(
+                source,
+                f"with a site file expected {_TAKEN} in the path, found {odd[0]!r} in {text!r}",
+            )
 
 
 def decks_at(config: Config, ranks: int) -> int:
@@ -124,7 +134,9 @@ def decks_at(config: Config, ranks: int) -> int:
     from parsl.executors.status_handling import BlockProviderExecutor
 
     return sum(
-        int(executor.workers_per_node // ranks) * executor.provider.nodes_per_block * executor.provider.max_blocks
+        int(executor.workers_per_node // ranks)
+        * executor.provider.nodes_per_block
+        * executor.provider.max_blocks
         for executor in config.executors
         if isinstance(executor, BlockProviderExecutor) and executor.provider is not None
     )
@@ -134,14 +146,23 @@ def prepare(config: Config, folder: Path, ranks: int) -> Config:
     """The configuration for decks of a number of MPI processes; the nodes must see the folder (scripts, logs)."""
     from parsl.executors import HighThroughputExecutor
 
-    config.run_dir, config.retries, config.retry_handler = str(folder), _MOST_LOSSES, _cost_of_failure
+    config.run_dir, config.retries, config.retry_handler = (
+        str(folder),
+        _MOST_LOSSES,
+        _cost_of_failure,
+    )
     for executor in config.executors:
         if isinstance(executor, HighThroughputExecutor):
             executor.worker_logdir_root = str(folder)
-            executor.interchange_launch_cmd = [*_GUARDED, str(Path(sys.executable).with_name("interchange.py"))]
+            executor.interchange_launch_cmd = [
+                *_GUARDED,
+                str(Path(sys.executable).with_name("interchange.py")),
+            ]
             executor.max_workers_per_node = executor.workers_per_node // ranks
             provider: Any = executor.provider
-            provider.worker_init += f'\nexport PATH={quote(str(Path(sys.executable).parent))}:"$PATH"\n'
+            provider.worker_init += (
+                f'\nexport PATH={quote(str(Path(sys.executable).parent))}:"$PATH"\n'
+            )
     return config
 
 

@@ -20,7 +20,14 @@ from walkers.inputs.units import parse_quantity
 from walkers.postprocess.measure.numbers import MAIN
 from walkers.postprocess.measure.quantities import declared, unit_shown
 from walkers.postprocess.measure.sides import REST
-from walkers.postprocess.measure.uncertainty import SPREAD_NAME, few_draws, held_of, held_text, in_lines, spread_of
+from walkers.postprocess.measure.uncertainty import (
+    SPREAD_NAME,
+    few_draws,
+    held_of,
+    held_text,
+    in_lines,
+    spread_of,
+)
 from walkers.progress import Tell
 from walkers.rounding import counted, rounded
 from walkers.runner.binary import find_engine
@@ -83,12 +90,17 @@ class Spread:
 
 def _range_of(value: Origin) -> dict[str, list[Any]]:
     """The range of a value for the sampler of a sweep; half of the draws are at or below the value of the case."""
-    name, (low, high) = "loguniform" if value.logarithmic else "uniform", value.range or (None, None)
+    name, (low, high) = (
+        "loguniform" if value.logarithmic else "uniform",
+        value.range or (None, None),
+    )
     ends: Range = ranges_of({value.key: {name: [low, high]}})[value.key]
     kind = kind_of(value.key)
     try:
         unit = parse_quantity(f"1 {ends.unit}", kind) if kind and ends.unit else 1.0
-        usual = (parse_quantity(value.text, kind) if kind and ends.unit else float(value.text)) / unit
+        usual = (
+            parse_quantity(value.text, kind) if kind and ends.unit else float(value.text)
+        ) / unit
     except ValueError:  # a value that the program computes, such as a time step
         return {name: [low, high]}
     if not ends.low * (1.0 - 1e-9) <= usual <= ends.high * (1.0 + 1e-9):
@@ -152,30 +164,46 @@ def run_spread(
     table = table_of(record)
     doubts = [result.warnings for result in table.results.values() if result.warnings]
     spread = replace(spread_in(table.frame, case, record.directory, failures), doubts=doubts)
-    write_json(record.directory / SPREAD_NAME, {**spread.as_dict(), "directory": record.directory.name})
+    write_json(
+        record.directory / SPREAD_NAME, {**spread.as_dict(), "directory": record.directory.name}
+    )
     return spread
 
 
-def spread_in(table: pd.DataFrame, case: Case, directory: Path, failures: Sequence[Failure] = ()) -> Spread:
+def spread_in(
+    table: pd.DataFrame, case: Case, directory: Path, failures: Sequence[Failure] = ()
+) -> Spread:
     """The spread of a case by the table of its sweep in a directory."""
     table = table[table["status"] == "finished"]
     whole, counts = together(table), {}
     if "velocity" in table:
         speeds = whole[main_columns(whole)[0]]
         counts = {"forward": int((speeds > REST).sum()), "backward": int((speeds < -REST).sum())}
-        counts |= {"at_rest": int((speeds.abs() <= REST).sum()), "separated": len(table) - len(whole)}
-    shown = [main_columns(whole)[0]] if "velocity" in table else [name for name in MAIN if name in table]
+        counts |= {
+            "at_rest": int((speeds.abs() <= REST).sum()),
+            "separated": len(table) - len(whole),
+        }
+    shown = (
+        [main_columns(whole)[0]]
+        if "velocity" in table
+        else [name for name in MAIN if name in table]
+    )
     varied, bands = tuple(value for value in case.origins if value.range is not None), {}
     for name in (name for name in shown if whole[name].notna().any()):
         ends = whole[name].astype(float).quantile([0.05, 0.5, 0.95, 0.0, 1.0])
-        bands[name] = dict(zip(("low", "median", "high", "smallest", "largest"), ends.tolist(), strict=True))
+        bands[name] = dict(
+            zip(("low", "median", "high", "smallest", "largest"), ends.tolist(), strict=True)
+        )
         bands[name]["points"] = int(whole[name].count())
     return Spread(
         directory=directory,
         varied=varied,
         held=held_of(case.origins),
         bands=bands,
-        depends={name: rank_correlations(whole, name, [value.key for value in varied]) or {} for name in shown},
+        depends={
+            name: rank_correlations(whole, name, [value.key for value in varied]) or {}
+            for name in shown
+        },
         counts=counts,
         failures=tuple(failures),
     )
@@ -197,12 +225,15 @@ def describe(spread: Spread) -> str:
     half = "half of them at or below the value of the case"
     lines = [f"  spread     {points} draws; values drawn independently from their ranges, {half}"]
     lines += [
-        f"{'':13}{value.key} {value.text} ({' to '.join(map(str, value.range or ()))})" for value in spread.varied
+        f"{'':13}{value.key} {value.text} ({' to '.join(map(str, value.range or ()))})"
+        for value in spread.varied
     ]
     lines += in_lines(f"    fixed    {held_text(spread.held)}")
     for name, band in spread.bands.items():
         unit, factor = unit_shown(declared(name).unit)
-        texts = {end: rounded(float(f"{number * factor:.3g}"), unit) for end, number in band.items()}
+        texts = {
+            end: rounded(float(f"{number * factor:.3g}"), unit) for end, number in band.items()
+        }
         ends = "{low} to {high} {unit} (5 to 95 %), median {median}; smallest {smallest}, largest {largest}"
         lines.append(f"    {declared(name).label:8} {ends.format(unit=unit, **texts)}")
         text = "no clear dependence on any of them"
@@ -211,7 +242,9 @@ def describe(spread: Spread) -> str:
         elif ranks := ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items()):
             text = f"strongest dependence: {ranks} (rank correlation)"
         lines.append(f"{'':13}{text}")
-    words = _WORDS | (_ON_A_SLOPE if {"right_facing", "axial_velocity"} & spread.bands.keys() else {})
+    words = _WORDS | (
+        _ON_A_SLOPE if {"right_facing", "axial_velocity"} & spread.bands.keys() else {}
+    )
     draws = [f"{count} {words[name]}" for name, count in spread.counts.items() if count]
     draws += [f"{len(spread.failures)} failed, not in the band"] if spread.failures else []
     lines += [f"    draws    {', '.join(draws)}"] if draws else []

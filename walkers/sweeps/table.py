@@ -24,7 +24,13 @@ from walkers.files import json_bytes, write_bytes
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.origins import text_of
 from walkers.postprocess.measure.numbers import headline
-from walkers.postprocess.measure.quantities import ENDS, GROUPS, described_columns, is_declared, unit_shown
+from walkers.postprocess.measure.quantities import (
+    ENDS,
+    GROUPS,
+    described_columns,
+    is_declared,
+    unit_shown,
+)
 from walkers.postprocess.measure.results import Results, modules_of
 from walkers.postprocess.measure.sides import SEPARATED
 from walkers.rounding import counted, rounded
@@ -42,7 +48,10 @@ if TYPE_CHECKING:
 
 STATE = {
     "status": ("", "finished, failed, running or missing"),
-    "lost": ("", "number of beads that left the simulation box; a run that loses beads has no result"),
+    "lost": (
+        "",
+        "number of beads that left the simulation box; a run that loses beads has no result",
+    ),
     "reason": ("", "name of the failure, or empty"),
     "message": ("", "message of the failure, how much of an interrupted run is done, or empty"),
     "run": ("", "run directory, relative to the folder in which the table was written"),
@@ -56,9 +65,29 @@ SEEDS = ("run.seed", "seed")
 """Keys of the random numbers of a start: points that differ in nothing else repeat an experiment."""
 FORMATS = ("csv", "parquet", "json")
 _SHOWN = {
-    *("gamma0", "sin_delta", "rotation_1", "sliding_1", "steady", "walkers", "upright", "work", "cost_of_transport"),
+    *(
+        "gamma0",
+        "sin_delta",
+        "rotation_1",
+        "sliding_1",
+        "steady",
+        "walkers",
+        "upright",
+        "work",
+        "cost_of_transport",
+    ),
     *("merged", "clustered_share", "held_share", "free_speed", "slow_share", "coverage"),
-    *("beads", "large", "duration", "climbs", "onset", "speed", "highest", "led_by_large", "clusters"),
+    *(
+        "beads",
+        "large",
+        "duration",
+        "climbs",
+        "onset",
+        "speed",
+        "highest",
+        "led_by_large",
+        "clusters",
+    ),
     *("surface_end", "brazil_nut_end", "settling"),
 }
 """Numbers of results in the printed table, beside the main one."""
@@ -122,7 +151,9 @@ def load(directory: str | Path) -> pd.DataFrame:
 def table_of(record: SweepRecord) -> SweepTable:
     """The table of a sweep with its results, by its record."""
     points = states(record, results=True)
-    results = {number: state.result for number, state in enumerate(points) if state.result is not None}
+    results = {
+        number: state.result for number, state in enumerate(points) if state.result is not None
+    }
     return SweepTable(_frame(record.sweep, points), results)
 
 
@@ -180,16 +211,28 @@ def _declared(sweep: Sweep) -> list[str]:
     """The numbers of results of a sweep's cases, without numbers of single beads; empty if a case cannot be read."""
     with suppress(InputError):
         groups = [module.NAME for module in modules_of(next(sweep.cases()))]
-        return [number.name for group in [*groups, "drive"] for number in GROUPS[group] if number.name[-1] != "*"]
+        return [
+            number.name
+            for group in [*groups, "drive"]
+            for number in GROUPS[group]
+            if number.name[-1] != "*"
+        ]
     return []
 
 
 def _row(number: int, sweep: Sweep, state: PointState) -> dict[str, Any]:
     row: dict[str, Any] = {"point": number, **(state.result or {})}
     for key, value in zip(sweep.keys, sweep.values[number], strict=True):
-        row |= {f"{key}[{part}]": item for part, item in enumerate(value)} if isinstance(value, list) else {key: value}
+        row |= (
+            {f"{key}[{part}]": item for part, item in enumerate(value)}
+            if isinstance(value, list)
+            else {key: value}
+        )
     row |= {name: getattr(state, name) or "" for name in ("status", "reason", "message")}
-    return row | {"lost": state.lost, "run": os.path.relpath(state.directory) if state.directory else ""}
+    return row | {
+        "lost": state.lost,
+        "run": os.path.relpath(state.directory) if state.directory else "",
+    }
 
 
 def groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
@@ -197,7 +240,11 @@ def groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]
 
     Each has the values of the varied columns that distinguish it (none if only seeds vary), and its rows.
     """
-    keys = [name for name in frame.attrs["varied"] if name not in SEEDS and frame[name].nunique(dropna=False) > 1]
+    keys = [
+        name
+        for name in frame.attrs["varied"]
+        if name not in SEEDS and frame[name].nunique(dropna=False) > 1
+    ]
     if not keys:
         yield {}, frame
         return
@@ -207,7 +254,11 @@ def groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]
 
 def together(frame: pd.DataFrame) -> pd.DataFrame:
     """The points of a sweep's table without those whose walkers came apart, which have no velocity."""
-    return frame[~(frame["separated_fraction"] > SEPARATED)] if "separated_fraction" in frame else frame
+    return (
+        frame[~(frame["separated_fraction"] > SEPARATED)]
+        if "separated_fraction" in frame
+        else frame
+    )
 
 
 def sides_differ(frame: pd.DataFrame) -> bool:
@@ -221,7 +272,9 @@ def main_columns(frame: pd.DataFrame) -> list[str]:
         return list(_RESULTS)
     finished: Any = frame.dropna(subset="velocity").to_dict("records")
     heads = set(map(headline, finished))
-    return [name for name in ("axial_velocity", "right_facing") if name in heads][:1] + list(_RESULTS)
+    return [name for name in ("axial_velocity", "right_facing") if name in heads][:1] + list(
+        _RESULTS
+    )
 
 
 def default_column(frame: pd.DataFrame) -> str:
@@ -232,7 +285,9 @@ def default_column(frame: pd.DataFrame) -> str:
 def find_name(option: str, word: str, names: Iterable[str]) -> str:
     """Find a name, or the only name that ends with ``.`` and it; `InputError` if there is none or several."""
     candidates = list(dict.fromkeys(names))
-    matches = [word] if word in candidates else [name for name in candidates if name.endswith(f".{word}")]
+    matches = (
+        [word] if word in candidates else [name for name in candidates if name.endswith(f".{word}")]
+    )
     if len(matches) == 1:
         return matches[0]
     text = f"expected one of {', '.join(matches or candidates)}{'' if matches else suggestion(word, candidates)}"
@@ -283,15 +338,20 @@ def encoded(frame: pd.DataFrame, form: str) -> bytes:
     import pyarrow.parquet as pq
 
     # Numbers and words ("auto") become words, booleans and NaN (not finished) become booleans.
-    mixed = {name: set(frame[name].map(type)) for name in frame.columns if frame[name].dtype == object}
+    mixed = {
+        name: set(frame[name].map(type)) for name in frame.columns if frame[name].dtype == object
+    }
     types = {name: "boolean" for name, kinds in mixed.items() if bool in kinds and str not in kinds}
     types |= {name: "str" for name, kinds in mixed.items() if str in kinds and len(kinds) > 1}
     table = pa.Table.from_pandas(frame.astype(types), preserve_index=False)
     fields = [
-        field.with_metadata({"unit": units[field.name], "meaning": meanings[field.name]}) for field in table.schema
+        field.with_metadata({"unit": units[field.name], "meaning": meanings[field.name]})
+        for field in table.schema
     ]
     buffer = io.BytesIO()
-    pq.write_table(table.cast(pa.schema(fields, metadata=table.schema.metadata)), buffer, compression="zstd")
+    pq.write_table(
+        table.cast(pa.schema(fields, metadata=table.schema.metadata)), buffer, compression="zstd"
+    )
     return buffer.getvalue()
 
 
@@ -302,7 +362,9 @@ def write_table_file(frame: pd.DataFrame, path: Path) -> None:
     write_bytes(path, encoded(frame, path.suffix.lstrip(".")))
 
 
-def cells_of(frame: pd.DataFrame, named: Callable[[str], str] | None = None) -> tuple[pd.DataFrame, str]:
+def cells_of(
+    frame: pd.DataFrame, named: Callable[[str], str] | None = None
+) -> tuple[pd.DataFrame, str]:
     """Varied keys, Γ0, sin δ and the main results of a table as text in mm, mm/s, nJ and degrees, with units in heads.
 
     The second value has the results that are the same at all points of a sweep. Columns are called ``named``; None: by
@@ -313,7 +375,11 @@ def cells_of(frame: pd.DataFrame, named: Callable[[str], str] | None = None) -> 
     main = main_columns(frame)
     shown = _SHOWN | (set(SIDES) if sides_differ(frame) else {"velocity", default_column(frame)})
     shown |= {f"{name}_{end}" for name in main for end in ENDS.keys() - {"error"}}
-    names = [name for name in map(str, frame) if name in shown or not (is_declared(name) or name in _ASIDE)]
+    names = [
+        name
+        for name in map(str, frame)
+        if name in shown or not (is_declared(name) or name in _ASIDE)
+    ]
     varied, cells, same = frame.attrs["varied"], {}, []
     kept = {"point", *varied, *main} if "status" in names else {*names}
     short = dict(zip(varied, short_keys(varied, names), strict=True))
@@ -359,12 +425,20 @@ def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
         finished = points[points["status"] == "finished"]
         slow = finished["velocity"].astype(float).abs() < until_below
         row = {name: points.iloc[0][name] for name in kept}
-        for name, part in (("moving", finished[~slow.cummax()].tail(1)), ("at_rest", finished[slow].head(1))):
+        for name, part in (
+            ("moving", finished[~slow.cummax()].tail(1)),
+            ("at_rest", finished[slow].head(1)),
+        ):
             row[name] = part.iloc[0][lowered] if len(part) else nan
             row[f"gamma0_{name}"] = part.iloc[0]["gamma0"] if len(part) else nan
         rows.append(row)
     table, units = pd.DataFrame(rows), frame.attrs["units"]
-    ends = {"moving": units[lowered], "gamma0_moving": "", "at_rest": units[lowered], "gamma0_at_rest": ""}
+    ends = {
+        "moving": units[lowered],
+        "gamma0_moving": "",
+        "at_rest": units[lowered],
+        "gamma0_at_rest": "",
+    }
     table.attrs |= {"units": {name: units[name] for name in kept} | ends, "varied": kept}
     return table
 
@@ -375,7 +449,10 @@ def describe_status(frame: pd.DataFrame) -> str:
         f"{frame.attrs['sweep']}: {counted(len(frame), 'point')}, {status_text(Counter(frame['status'])) or 'none'}"
     ]
     failed = frame[frame["status"] == "failed"]
-    lines += [f"  failed     point {row.point}: {row.message}" for row in failed[:_MOST_FAILURES].itertuples()]
+    lines += [
+        f"  failed     point {row.point}: {row.message}"
+        for row in failed[:_MOST_FAILURES].itertuples()
+    ]
     if len(failed) > _MOST_FAILURES:
         lines.append(f"             and {len(failed) - _MOST_FAILURES} more")
     begun = frame[(frame["status"] == "missing") & (frame["message"] != "")]

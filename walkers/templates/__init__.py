@@ -4,4 +4,6 @@ Uses cases (`inputs`), not processes, files on disk or results. docs/explanation
 """
 
 if __name__ != "walkers.templates":
-    raise ImportError("templates is a link to the package walkers.templates: import walkers.templates")
+    raise ImportError(
+        "templates is a link to the package walkers.templates: import walkers.templates"
+    )

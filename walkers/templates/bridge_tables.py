@@ -62,7 +62,9 @@ class Table:
         gaps = np.clip(gaps, 0.0, rupture)
         mantissa, exponent = np.frexp(1.0 + gaps / self.scale)
         near = self.cells * ((exponent - 1) + 2.0 * mantissa - 1.0)
-        far = self.cells * (self.octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle))))
+        far = self.cells * (
+            self.octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle)))
+        )
         place = np.where(gaps < middle, near, far)
         cell = np.minimum(place.astype(int), (len(self.rows) - 1) // 3 - 1)
         # Lagrange's polynomials of the rows at 0, 1/3, 2/3 and 1 of the cell; products and sums alone
@@ -80,7 +82,9 @@ class Table:
         """The text of the table in the engine's file; twelve digits, far more accurate than `TOLERANCE`."""
         head = f"range {self.curve.formation!r} {self.curve.rupture!r} {self.scale!r} {self.octaves} {self.cells}"
         numbers = np.column_stack([self.gaps, self.rows])
-        line = " ".join(["%.12g"] * numbers.shape[1])  # a pile has millions of numbers: one format a row takes half
+        line = " ".join(
+            ["%.12g"] * numbers.shape[1]
+        )  # a pile has millions of numbers: one format a row takes half
         return "\n".join([head, *(line % tuple(row) for row in numbers.tolist())]) + "\n"
 
 
@@ -125,13 +129,20 @@ def bridge_tables(
     The surfaces have the contact and the liquid of each atom type of beads, the sizes atom type and radius (m) of the
     beads; without a law, each liquid has its own.
     """
-    parts = ["# Gap (m), pull (N), resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s).\n"]
+    parts = [
+        "# Gap (m), pull (N), resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s).\n"
+    ]
     for kind, (contact, liquid) in enumerate(surfaces, 1):
         radii = sorted(radius for of, radius in sizes if of == kind)
         for number, radius in enumerate(radii):
-            for other_kind, other_radius in [(len(surfaces) + 1, inf), *((kind, size) for size in radii[number:])]:
+            for other_kind, other_radius in [
+                (len(surfaces) + 1, inf),
+                *((kind, size) for size in radii[number:]),
+            ]:
                 for meeting in Surfaces.of(radius, other_radius, liquid, contact.roughness).volumes:
-                    parts.append(f'# law "{liquid.law}"\nbridge {kind} {other_kind} {radius!r} {other_radius!r}\n')
+                    parts.append(
+                        f'# law "{liquid.law}"\nbridge {kind} {other_kind} {radius!r} {other_radius!r}\n'
+                    )
                     if liquid.conserved:
                         numbers = " ".join(map(repr, (meeting.volume, *chain(*meeting.films))))
                         parts.append(f"liquid {numbers}\n")
@@ -162,7 +173,10 @@ class RecordedLaw:
         """The curve of two surfaces; raises `UnusableLawError` if the run has no such bridge."""
         for part in self.tables.split("\nbridge ")[1:]:
             head, text = part.split("\nrange ")
-            if [float(word) for word in head.split()[2:4]] == [surfaces.radius, surfaces.other_radius]:
+            if [float(word) for word in head.split()[2:4]] == [
+                surfaces.radius,
+                surfaces.other_radius,
+            ]:
                 return _recorded(text)
         raise UnusableLawError("the run has recorded no bridge between surfaces of these radii")
 

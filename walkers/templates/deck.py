@@ -16,7 +16,13 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import AXES, Excitation
 from walkers.physics.capillary import bead_volume
 from walkers.physics.laws import LAWS
-from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, MEAN_SPIN_COLUMNS, Layout, PlacedWalker
+from walkers.templates.layout import (
+    BEAD_COLUMNS,
+    FILM_COLUMN,
+    MEAN_SPIN_COLUMNS,
+    Layout,
+    PlacedWalker,
+)
 from walkers.templates.placement import Scene, Surface, place, surface_of
 from walkers.text import rendered
 
@@ -35,7 +41,13 @@ SCALE_NAME = "scale.awk"
 """Script beside decks to be run by hand: rescales the tables for an edited viscosity."""
 _NAMES = {
     **{"layout": LAYOUT_NAME, "bridges": BRIDGES_NAME, "scaled": SCALED_BRIDGES_NAME},
-    **{"loads": LOADS_NAME, "facets": FACETS_NAME, "beads": BEADS_NAME, "run": RUN_NAME, "scale": SCALE_NAME},
+    **{
+        "loads": LOADS_NAME,
+        "facets": FACETS_NAME,
+        "beads": BEADS_NAME,
+        "run": RUN_NAME,
+        "scale": SCALE_NAME,
+    },
 }
 STATUS_LINES_PER_CYCLE = 4
 PRINTED = "parameters:"
@@ -57,7 +69,9 @@ MOST_CREATED = 100
 take 9 s, from a file of ``read_data`` 0.1 s."""
 _LEAST_NEIGHBOURS = 100
 _SILENCE = 600.0  # s; piles of 200 beads write some thirty lines a second, those of 20,000 one in four seconds
-_SLOWEST_STEP = 4e-5  # s a bead: thirty times the time with two beads alone, a hundred times the time in a pile
+_SLOWEST_STEP = (
+    4e-5  # s a bead: thirty times the time with two beads alone, a hundred times the time in a pile
+)
 _LOG_BYTES = 64e6  # walkers write some 50 kB, a segment of a pile as much …
 _LOG_BYTES_PER_CYCLE = 1e4  # … and a cycle some 500 bytes
 _SKIN = 2e-4
@@ -106,8 +120,12 @@ class Plan:
     ranks: int = 1  # number of MPI processes
     restart_to: str | None = None  # restart file to write at the end
     restart_from: str | None = None  # restart file to continue from
-    fastest: float | None = None  # speed that no bead can reach, m/s; default: `fastest_of` the case
-    skin: float | None = None  # search distance for neighbours beyond contact, m; default: the smallest radius, with
+    fastest: float | None = (
+        None  # speed that no bead can reach, m/s; default: `fastest_of` the case
+    )
+    skin: float | None = (
+        None  # search distance for neighbours beyond contact, m; default: the smallest radius, with
+    )
     # wide bins, for few beads far apart
 
 
@@ -117,7 +135,10 @@ def next_segment(case: Case, begin: int = 0, start: int | None = None) -> Segmen
     if start is None and run.rests:
         return Segment(begin, begin + settling_steps(case), None)
     start = start or 0
-    end = min(begin + run.cycles_per_segment * run.steps_per_cycle, start + run.attempts[0] * run.steps_per_cycle)
+    end = min(
+        begin + run.cycles_per_segment * run.steps_per_cycle,
+        start + run.attempts[0] * run.steps_per_cycle,
+    )
     return Segment(begin, end, start)
 
 
@@ -143,7 +164,11 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
     case, run = cases[0], cases[0].run
     segment = segment or next_segment(case)
     scene, walkers = place(cases)
-    columns = [*BEAD_COLUMNS, *(MEAN_SPIN_COLUMNS if walkers else ()), *([FILM_COLUMN] * case.liquid.conserved)]
+    columns = [
+        *BEAD_COLUMNS,
+        *(MEAN_SPIN_COLUMNS if walkers else ()),
+        *([FILM_COLUMN] * case.liquid.conserved),
+    ]
     restart = None if run.in_one else RESTART_NAME
     return Plan(
         case=case,
@@ -164,7 +189,12 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
 
 def compose(plan: Plan) -> Deck:
     """Compose a deck from its blocks; raises `InputError` if the law of the bridges cannot be tabulated."""
-    case, scene, layout, gravity = plan.case, plan.scene, _layout(plan), plan.case.environment.gravity
+    case, scene, layout, gravity = (
+        plan.case,
+        plan.scene,
+        _layout(plan),
+        plan.case.environment.gravity,
+    )
     surfaces = scene.surfaces or (surface_of(case),)
     liquid, contacts = surfaces[0][1], [contact for contact, _ in surfaces]
     # Resistances of built-in laws are proportional to the viscosity.
@@ -209,7 +239,9 @@ def compose(plan: Plan) -> Deck:
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits.exceeded_by(case.run.time_step))
     # The engine writes once a sample, and several times a cycle.
-    slowest = min(case.run.steps_per_sample, case.run.steps_per_cycle) * len(scene.beads) * _SLOWEST_STEP
+    slowest = (
+        min(case.run.steps_per_sample, case.run.steps_per_cycle) * len(scene.beads) * _SLOWEST_STEP
+    )
     bounds = (max(_SILENCE, slowest), max(_LOG_BYTES, case.run.cycles * _LOG_BYTES_PER_CYCLE))
     return Deck(text, files, layout, (scene.lower, scene.upper), fastest, *bounds, beyond)
 
@@ -231,7 +263,11 @@ def in_cycles(steps: int, steps_per_cycle: int) -> str:
         return "${steps_per_cycle}" if whole == 1 else f"$({whole}*v_steps_per_cycle)"
     for parts in (steps_per_cycle // steps, STATUS_LINES_PER_CYCLE):
         if parts and ceil(steps_per_cycle / parts) == steps:
-            return f"$(ceil(v_steps_per_cycle/{parts}))" if steps_per_cycle % parts else f"$(v_steps_per_cycle/{parts})"
+            return (
+                f"$(ceil(v_steps_per_cycle/{parts}))"
+                if steps_per_cycle % parts
+                else f"$(v_steps_per_cycle/{parts})"
+            )
     return str(steps)
 
 
@@ -247,7 +283,9 @@ def _start(drive: Excitation) -> list[float]:
         return []
     import numpy as np
 
-    moved = [(direction, float(speed[0])) for direction, (_, speed, _) in drive.motions(np.zeros(1))]
+    moved = [
+        (direction, float(speed[0])) for direction, (_, speed, _) in drive.motions(np.zeros(1))
+    ]
     return [sum(direction[axis] * speed for direction, speed in moved) for axis in range(3)]
 
 
@@ -281,7 +319,10 @@ def bridge_tables_digest(case: Case) -> str:
 def _loads(scene: Scene) -> str:
     """Gravity and the amplitude of each harmonic for beads whose loading is not the first, as the engine reads them."""
     return "".join(
-        " ".join([str(bead.id), *(repr(x) for vector in scene.loadings[bead.loading] for x in vector)]) + "\n"
+        " ".join(
+            [str(bead.id), *(repr(x) for vector in scene.loadings[bead.loading] for x in vector)]
+        )
+        + "\n"
         for bead in scene.beads
         if bead.loading
     )
@@ -332,7 +373,9 @@ def _beads_data(scene: Scene, density: float, types: int) -> str:
     for bead in scene.beads:
         own_density = density if bead.density is None else bead.density
         numbers = (2.0 * bead.radius, own_density, *bead.centre)
-        lines.append(" ".join([str(bead.id), str(bead.surface), *(repr(float(x)) for x in numbers)]))
+        lines.append(
+            " ".join([str(bead.id), str(bead.surface), *(repr(float(x)) for x in numbers)])
+        )
     lines += ["", "Velocities", ""]
     for bead in scene.beads:
         motion = (*bead.velocity, *bead.spin)
@@ -347,13 +390,26 @@ def fastest_of(case: Case, scene: Scene) -> float:
     bridge = bridge_at_rest(case, sizes[-1], inf)
     work = abs(bridge.pull) * bridge.rupture  # among loose beads, a bridge may push
     deep = hop_height(case) if case.boundary.tilt == 0.0 else reach(case)
-    fall = sqrt(2.0 * case.environment.gravity * (max(scene.upper[2], deep) if case.loose else deep))
-    return (20.0 if case.loose else 10.0) * case.excitation.peak_velocity + fall + sqrt(2.0 * work / mass)
+    fall = sqrt(
+        2.0 * case.environment.gravity * (max(scene.upper[2], deep) if case.loose else deep)
+    )
+    return (
+        (20.0 if case.loose else 10.0) * case.excitation.peak_velocity
+        + fall
+        + sqrt(2.0 * work / mass)
+    )
 
 
 def _layout(plan: Plan) -> Layout:
     steps = plan.segment.end - plan.segment.begin
-    same = ("bead_columns", "sample_every", "wall_bridge_columns", "bridge_every", "walkers", "ranks")
+    same = (
+        "bead_columns",
+        "sample_every",
+        "wall_bridge_columns",
+        "bridge_every",
+        "walkers",
+        "ranks",
+    )
     return Layout(
         **{name: getattr(plan, name) for name in same},
         frames=steps // plan.sample_every + 1,

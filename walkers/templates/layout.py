@@ -7,7 +7,20 @@ from typing import Any
 
 from pydantic.dataclasses import dataclass
 
-BEAD_COLUMNS = ("id", "type", "radius", "x", "y", "z", "vx", "vy", "vz", "omegax", "omegay", "omegaz")
+BEAD_COLUMNS = (
+    "id",
+    "type",
+    "radius",
+    "x",
+    "y",
+    "z",
+    "vx",
+    "vy",
+    "vz",
+    "omegax",
+    "omegay",
+    "omegaz",
+)
 """Columns of the bead dump, in the engine's names (m, m/s, rad/s)."""
 MEAN_SPIN_COLUMNS = ("f_mean_spin[1]", "f_mean_spin[2]", "f_mean_spin[3]")
 """Further columns for walkers: angular velocity, averaged over the steps since the last frame (rad/s)."""
@@ -16,9 +29,27 @@ FILM_COLUMN = "f_film"
 FORCE_COLUMNS = ("fx", "fy", "fz", "tqx", "tqy", "tqz")
 """Optional further columns (N, N m)."""
 
-PAIR_BRIDGES = {"x1 y1 z1 x2 y2 z2": "pos", "id1 id2 periodic": "id", "fx fy fz": "force", "overlap": "delta"}
+PAIR_BRIDGES = {
+    "x1 y1 z1 x2 y2 z2": "pos",
+    "id1 id2 periodic": "id",
+    "fx fy fz": "force",
+    "overlap": "delta",
+}
 """Output of the engine for bridges between beads, in its order: columns and the option that gives them."""
-WALL_BRIDGES = ("x", "y", "z", "bead_x", "bead_y", "bead_z", "wall", "id", "fx", "fy", "fz", "overlap")
+WALL_BRIDGES = (
+    "x",
+    "y",
+    "z",
+    "bead_x",
+    "bead_y",
+    "bead_z",
+    "wall",
+    "id",
+    "fx",
+    "fy",
+    "fz",
+    "overlap",
+)
 """Output of the fix of the walls for bridges to walls, in its order: foot, bead, number of the wall, …"""
 PAIR_BRIDGE_COLUMNS = ("id1", "id2", "fx", "fy", "fz", "overlap")
 """Columns of the dump of bridges between beads; the force acts on bead ``id1``."""
@@ -78,8 +109,12 @@ class Layout:
         pairs = " ".join(PAIR_BRIDGES).split()
         return {
             "pair_bridge_options": " ".join(PAIR_BRIDGES.values()),
-            "pair_bridge_terms": [f"c_pair_bridges[{pairs.index(column) + 1}]" for column in self.pair_bridge_columns],
-            "wall_bridge_terms": [f"f_walls[{WALL_BRIDGES.index(column) + 1}]" for column in self.wall_bridge_columns],
+            "pair_bridge_terms": [
+                f"c_pair_bridges[{pairs.index(column) + 1}]" for column in self.pair_bridge_columns
+            ],
+            "wall_bridge_terms": [
+                f"f_walls[{WALL_BRIDGES.index(column) + 1}]" for column in self.wall_bridge_columns
+            ],
         }
 
     def as_dict(self) -> dict[str, Any]:

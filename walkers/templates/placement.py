@@ -80,7 +80,9 @@ def sharing_key(case: Case) -> Hashable:
     crowded = case if min(walkers.spacing for walkers in case.walkers) < 2.0 * reach(case) else None
     # The model of rolling friction is in the deck or not.
     rolling = float(case.contact.rolling_friction > 0.0)
-    contact = case.contact.but(friction=None, roughness=None, restitution=0.0, rolling_friction=rolling)
+    contact = case.contact.but(
+        friction=None, roughness=None, restitution=0.0, rolling_friction=rolling
+    )
     boundary = case.boundary.but(material="", tilt=0.0, uphill=0.0)
     times: Hashable = (
         *((harmonic.frequency, harmonic.phase) for harmonic in case.excitation.harmonics),
@@ -124,7 +126,9 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
     return Scene(tuple(beads), boundary.walls, *room, surfaces, loadings), tuple(walkers)
 
 
-def _room(cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float) -> tuple[Vector, Vector]:
+def _room(
+    cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float
+) -> tuple[Vector, Vector]:
     far = max(spacing / 2.0, *(reach(case) for case in cases))
     largest = max(max(case.radii) for case in cases)
     amplitude = max(case.excitation.farthest for case in cases)

@@ -31,7 +31,12 @@ from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.physics.dimer import Dimer
 from walkers.theory.motion import Walker, walk
-from walkers.theory.quasistatic import inertia_matrix, normal_force_matrix, rolling_matrix, translation
+from walkers.theory.quasistatic import (
+    inertia_matrix,
+    normal_force_matrix,
+    rolling_matrix,
+    translation,
+)
 
 LARGEST_STABLE_V = 0.45402316686747424
 """Largest V with stable small angles on a level substrate: the characteristic value b1(q = 2V) is zero."""
@@ -80,7 +85,9 @@ def alignment(case: Case) -> Alignment:
     (first, second), masses = dimer.radii, dimer.masses
     lever = (first - second) / (2.0 * sqrt(first * second))
     moment = masses[0] * first**2 + masses[1] * second**2
-    per_acceleration = 5.0 / 7.0 * lever * (masses[0] * first + masses[1] * second) / moment / pi_f**2
+    per_acceleration = (
+        5.0 / 7.0 * lever * (masses[0] * first + masses[1] * second) / moment / pi_f**2
+    )
     rolling_resistance = float(Walker.of_case(case).resistances[2, :2].sum())
     return Alignment(
         -case.axial_gravity * per_acceleration,
@@ -112,7 +119,11 @@ def turning_rate(case: Case) -> float | None:
     by μ F R/|ω|, with the engine's model of constant torque; it is left out of the axial motion.
     """
     dimer, walker = dimer_of(case), Walker.of_case(case)
-    frequency, peak, steady = case.excitation.frequency, case.excitation.peak_acceleration, case.axial_gravity
+    frequency, peak, steady = (
+        case.excitation.frequency,
+        case.excitation.peak_acceleration,
+        case.axial_gravity,
+    )
     motion = walk(walker, frequency, peak, steady_acceleration=steady, steps_per_cycle=_STEPS)
     if not (motion.periodic[0] and motion.solved[0]):
         return None
@@ -125,16 +136,29 @@ def turning_rate(case: Case) -> float | None:
     _, coupling, rolling = walker.resistances
     couples = coupling * sliding + rolling * (roll @ sliding)
     parallel = np.linalg.solve(gains, -slope - np.outer([1.0, 1.0, 0.0], pull)) - roll.T @ couples
-    normal = walker.at_rest * dimer.capillary_scale + normal_force_matrix(dimer.sin_delta) @ parallel
+    normal = (
+        walker.at_rest * dimer.capillary_scale + normal_force_matrix(dimer.sin_delta) @ parallel
+    )
     normal = np.maximum(normal, 0.0)  # an open contact has no load
-    radii, masses, accelerated = np.array(dimer.radii)[:, None], np.array(dimer.masses)[:, None], translation(slope)
+    radii, masses, accelerated = (
+        np.array(dimer.radii)[:, None],
+        np.array(dimer.masses)[:, None],
+        translation(slope),
+    )
     spin = (translation(sliding) - sliding[:2]) / radii  # about the horizontal across the axis
-    push = masses[0] * (accelerated + pull) + parallel[0]  # along the axis, of the second bead on the first
-    torque = 0.4 * masses * radii * (accelerated - slope[:2]) - radii * parallel[:2] - couples[:2]  # of the other bead
+    push = (
+        masses[0] * (accelerated + pull) + parallel[0]
+    )  # along the axis, of the second bead on the first
+    torque = (
+        0.4 * masses * radii * (accelerated - slope[:2]) - radii * parallel[:2] - couples[:2]
+    )  # of the other bead
     # Resistance to sideways sliding, and to rolling at the mean sideways speed of the beads at `_ANGLE`.
     drags = walker.friction * normal / np.maximum(np.abs(sliding), _SLOWEST)
     speed = 5.0 / 7.0 * peak / (2.0 * pi * frequency) * _ANGLE / sqrt(2.0)
-    levers, spins = np.array([*dimer.radii, dimer.reduced_radius])[:, None], np.array([*spin, spin[0] - spin[1]])
+    levers, spins = (
+        np.array([*dimer.radii, dimer.reduced_radius])[:, None],
+        np.array([*spin, spin[0] - spin[1]]),
+    )
     hindered = case.contact.rolling_friction * normal * levers / np.hypot(spins, speed / levers)
     slopes = _sideways(dimer, walker.resistances, drags, hindered, spin, push, torque)
     multipliers = _multipliers(slopes, 1.0 / (frequency * _STEPS))
@@ -166,7 +190,11 @@ def _sideways(
     slopes = np.zeros((len(push), 7, 7))
     sliding, rolling = np.zeros((2, 3, *slopes.shape[::2]))  # sideways, at each contact
     for bead in range(2):
-        sliding[bead, :, 1 + bead], sliding[bead, :, 3 + bead], rolling[bead, :, 3 + bead] = 1.0, radii[bead], 1.0
+        sliding[bead, :, 1 + bead], sliding[bead, :, 3 + bead], rolling[bead, :, 3 + bead] = (
+            1.0,
+            radii[bead],
+            1.0,
+        )
     sliding[2, :, 0], rolling[2, :, 0] = sine * (radii @ spin), sine * (spin[0] - spin[1])
     sliding[2, :, 1:] = [1.0, -1.0, *(radii * sine), *(-radii * cosine)]
     rolling[2, :, 3:] = [sine, -sine, -cosine, cosine]
@@ -181,7 +209,9 @@ def _sideways(
         slopes[:, velocity] = (side * forces[2] + forces[bead]) / dimer.masses[bead]
         slopes[:, velocity, 0] += side * push / dimer.masses[bead]
         between = radii[bead] * forces[2] + side * couples[2]
-        slopes[:, roll] = (radii[bead] * forces[bead] + couples[bead] + sine * between) / inertias[bead]
+        slopes[:, roll] = (radii[bead] * forces[bead] + couples[bead] + sine * between) / inertias[
+            bead
+        ]
         slopes[:, roll, 0] -= torque[bead] / inertias[bead]
         slopes[:, vertical] = -cosine * between / inertias[bead]
     return slopes

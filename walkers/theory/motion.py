@@ -27,7 +27,12 @@ from walkers.arrays import FloatArray
 from walkers.extras import require
 from walkers.inputs.resolving.loads import contact_loads, dimer_of, resistances_at_rest
 from walkers.inputs.tables.case import Case
-from walkers.theory.quasistatic import inertia_matrix, normal_force_matrix, rolling_matrix, translation
+from walkers.theory.quasistatic import (
+    inertia_matrix,
+    normal_force_matrix,
+    rolling_matrix,
+    translation,
+)
 
 if TYPE_CHECKING:
     from walkers.theory.stepping import Effect
@@ -63,7 +68,9 @@ class Walker:
         first, second = dimer.radii
         meeting = ((first, inf), (second, inf), (first, second))
         resistances = np.array([resistances_at_rest(case, *pair) for pair in meeting]).T
-        resistances[1, 2] *= -1.0 if first > second else 1.0  # computed with the smaller bead as body 1
+        resistances[1, 2] *= (
+            -1.0 if first > second else 1.0
+        )  # computed with the smaller bead as body 1
         law = case.contact.friction
         return cls(
             radii=np.array(dimer.radii)[:, None],
@@ -92,9 +99,15 @@ class Motion:
     velocity: FloatArray  # shape (N,)
     rotation: FloatArray  # velocities -R dφ/dt of the beads, shape (2, N)
     sliding: FloatArray  # at the contacts, shape (3, N)
-    smallest_normal_force: FloatArray  # of each contact in that cycle, in units of 4πγR̄, shape (3, N)
-    periodic: npt.NDArray[np.bool_]  # whether the cycles agree within the error of the steps, shape (N,)
-    solved: npt.NDArray[np.bool_]  # whether forces that obey the law of friction were found all the way, shape (N,)
+    smallest_normal_force: (
+        FloatArray  # of each contact in that cycle, in units of 4πγR̄, shape (3, N)
+    )
+    periodic: npt.NDArray[
+        np.bool_
+    ]  # whether the cycles agree within the error of the steps, shape (N,)
+    solved: npt.NDArray[
+        np.bool_
+    ]  # whether forces that obey the law of friction were found all the way, shape (N,)
     series: FloatArray  # sliding velocities through that cycle, at the ends of its steps, shape (3, N, steps)
 
     @property
@@ -127,7 +140,9 @@ def walk(
     require("theory")
     from walkers.theory.stepping import integrate
 
-    quantities = map(np.atleast_1d, (frequency, peak_acceleration, steady_acceleration, walker.scale))
+    quantities = map(
+        np.atleast_1d, (frequency, peak_acceleration, steady_acceleration, walker.scale)
+    )
     drive = np.stack(np.broadcast_arrays(*quantities)[:3], axis=-1).astype(np.float64)
     friction = np.broadcast_to(walker.friction, (3, len(drive))).T.copy()
     tables = _tables(walker, drive[:, 0] * steps_per_cycle)
@@ -159,7 +174,9 @@ def _tables(walker: Walker, steps_per_second: FloatArray) -> FloatArray:
 
     gains = inertia_matrix(walker.sin_delta) * walker.scale[:, None, None]
     presses, roll = normal_force_matrix(walker.sin_delta), rolling_matrix(*walker.radii)
-    slide, couple, turn = np.moveaxis(walker.resistances / walker.force_unit, -1, 1)[..., None] * np.eye(3)
+    slide, couple, turn = np.moveaxis(walker.resistances / walker.force_unit, -1, 1)[
+        ..., None
+    ] * np.eye(3)
     forces, couples = slide + couple @ roll, couple + turn @ roll
     slowed = gains @ (forces + np.swapaxes(roll, 1, 2) @ couples)
     seconds = (STAGE / FINER ** np.arange(LEVELS) / steps_per_second[:, None])[..., None, None]
@@ -168,5 +185,8 @@ def _tables(walker: Walker, steps_per_second: FloatArray) -> FloatArray:
     presses = presses[:, None] - seconds * lifts @ gains
     rest = walker.at_rest.T[:, None, None]
     shape = coast.shape[:2]
-    parts = [np.broadcast_to(part, (*shape, *part.shape[2:])) for part in (coast, gains, presses, lifts, rest)]
+    parts = [
+        np.broadcast_to(part, (*shape, *part.shape[2:]))
+        for part in (coast, gains, presses, lifts, rest)
+    ]
     return np.concatenate(parts, axis=2)

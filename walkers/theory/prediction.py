@@ -80,7 +80,9 @@ def check_applies(*cases: Case) -> None:
             text = "the theory is for a single harmonic along the plane, without a phase or a ramp"
             raise NotApplicable("drive", text)
         if hypot(*case.gravity_vector[:2]) > abs(case.axial_gravity) + 1e-9:
-            raise NotApplicable("boundary.uphill", "the theory is for planes tilted along the drive")
+            raise NotApplicable(
+                "boundary.uphill", "the theory is for planes tilted along the drive"
+            )
 
 
 def threshold(case: Case) -> float:
@@ -141,7 +143,11 @@ def predict(case: Case) -> dict[str, Any]:
     linear, reason = nan, why_not_the_paper(case)
     if reason is None:
         linear = float(mean_velocity(gamma0, dimer.sin_delta))
-        reason = None if np.isfinite(linear) else f"{CONTACTS[int(detachment(dimer.sin_delta).contact)]} would open"
+        reason = (
+            None
+            if np.isfinite(linear)
+            else f"{CONTACTS[int(detachment(dimer.sin_delta).contact)]} would open"
+        )
     return {
         "gamma0": gamma0,
         "sin_delta": dimer.sin_delta,
@@ -162,7 +168,11 @@ def predict(case: Case) -> dict[str, Any]:
 
 def why_not_the_paper(case: Case) -> str | None:
     """Reason why the fit of the paper does not apply to a case; None if it applies."""
-    same = case.beads.material == _BEADS and case.boundary.material in _BOUNDARIES and case.liquid.name in _LIQUIDS
+    same = (
+        case.beads.material == _BEADS
+        and case.boundary.material in _BOUNDARIES
+        and case.liquid.name in _LIQUIDS
+    )
     if same and case.axial_gravity == 0.0:
         return None
     return f"the fit is to {_BEADS} on level {' or '.join(_BOUNDARIES)} in {' or '.join(_LIQUIDS)}"
@@ -173,13 +183,32 @@ def outside_of_the_paper(case: Case) -> str | None:
     if not case.walkers or len(case.walkers[0].radii) != 2:
         return None
     drive, (slow, fast) = case.excitation, _FREQUENCIES
-    peak, gamma0 = drive.peak_acceleration / ACCELERATION_OF_ONE_G, dimer_of(case).gamma0(drive.peak_acceleration)
+    peak, gamma0 = (
+        drive.peak_acceleration / ACCELERATION_OF_ONE_G,
+        dimer_of(case).gamma0(drive.peak_acceleration),
+    )
     beyond = [
-        *([f"Γ0 = {gamma0:.3g} (measured up to {_LARGEST_GAMMA0:g})"] if gamma0 > _LARGEST_GAMMA0 else []),
-        *([f"{peak:.3g} g (up to {_LARGEST_PEAK:g} g)"] if peak > (1.0 + 1e-9) * _LARGEST_PEAK else []),
-        *([] if slow <= drive.frequency <= fast else [f"{drive.frequency:g} Hz ({slow:g} to {fast:g} Hz)"]),
+        *(
+            [f"Γ0 = {gamma0:.3g} (measured up to {_LARGEST_GAMMA0:g})"]
+            if gamma0 > _LARGEST_GAMMA0
+            else []
+        ),
+        *(
+            [f"{peak:.3g} g (up to {_LARGEST_PEAK:g} g)"]
+            if peak > (1.0 + 1e-9) * _LARGEST_PEAK
+            else []
+        ),
+        *(
+            []
+            if slow <= drive.frequency <= fast
+            else [f"{drive.frequency:g} Hz ({slow:g} to {fast:g} Hz)"]
+        ),
     ]
-    return f"outside the paper's range: {', '.join(beyond)}; the models are not tested there" if beyond else None
+    return (
+        f"outside the paper's range: {', '.join(beyond)}; the models are not tested there"
+        if beyond
+        else None
+    )
 
 
 def _why_unknown(motion: Motion, of: int) -> str | None:
@@ -227,27 +256,54 @@ def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> st
         "engine": {"velocity": None, "reason": "run it: walkers run CASE"},
     }
     if result:
-        speeds = {"rotation": [result["rotation_1"], result["rotation_2"]], "sliding": [result["sliding_1"]]}
+        speeds = {
+            "rotation": [result["rotation_1"], result["rotation_2"]],
+            "sliding": [result["sliding_1"]],
+        }
         both = result["goes_uphill"] and result["facing_right"] and result["facing_left"]
         del models["engine"]
-        models["engine, facing up" if both else "engine"] = {"velocity": result["velocity"], **speeds}
+        models["engine, facing up" if both else "engine"] = {
+            "velocity": result["velocity"],
+            **speeds,
+        }
     rows = [["mm/s", "velocity", "rotation 1", "rotation 2", "sliding 1", "Γc", ""]]
     for name, model in models.items():
         velocity, gamma = model["velocity"], model.get("threshold")
-        of_beads = [*model.get("rotation", []), *model.get("sliding", [])[:1]] if velocity is not None else []
+        of_beads = (
+            [*model.get("rotation", []), *model.get("sliding", [])[:1]]
+            if velocity is not None
+            else []
+        )
         speeds_shown = ["-" if velocity is None else with_decimals(velocity * 1e3, 3)]
         speeds_shown += [with_decimals(speed * 1e3, 2) for speed in of_beads]
-        cells = [*speeds_shown, *[""] * (4 - len(speeds_shown)), "" if gamma is None else f"{gamma:.3f}"]
+        cells = [
+            *speeds_shown,
+            *[""] * (4 - len(speeds_shown)),
+            "" if gamma is None else f"{gamma:.3f}",
+        ]
         rows.append([name, *cells, model.get("reason") or ""])
     beyond = f"; beyond, {end['reason']}" if end["reason"] else ", the strongest drive tried"
-    equation = ", ".join(f"{name} = {state[key]:.3g}" for name, key in (("U", "u"), ("V", "v"), ("β", "damping")))
+    equation = ", ".join(
+        f"{name} = {state[key]:.3g}" for name, key in (("U", "u"), ("V", "v"), ("β", "damping"))
+    )
     small = f"small angles {'stay small' if state['stable'] else 'grow'}"
-    rolling = f"{small if state['u'] or state['v'] else 'no torque toward the axis'} if the beads roll"
-    notes = [["contacts", f"with Coulomb friction and drag stay closed up to about Γ0 = {end['gamma']:.2g}{beyond}"]]
+    rolling = (
+        f"{small if state['u'] or state['v'] else 'no torque toward the axis'} if the beads roll"
+    )
+    notes = [
+        [
+            "contacts",
+            f"with Coulomb friction and drag stay closed up to about Γ0 = {end['gamma']:.2g}{beyond}",
+        ]
+    ]
     bound = "" if state["u"] else f" (stable for V < {state['largest_stable_v']:.3g})"
     slip, rate = "unknown: the axial motion is not periodic", state["rate"]
     if rate is not None:
-        at = " at 1° (with rolling friction, smaller ones may grow)" if state["rolling_friction"] else ""
+        at = (
+            " at 1° (with rolling friction, smaller ones may grow)"
+            if state["rolling_friction"]
+            else ""
+        )
         slip = f"small angles {'grow' if rate > 0.0 else 'decay'} by {abs(rate):.3g}/s{at}"
         if state["turns_over_after"]:
             slip += f"; turns over after about {state['turns_over_after']:.2g} s (from 1° to 90°)"
@@ -259,7 +315,9 @@ def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> st
     return "\n".join([head, *outside, aligned(rows, right=range(1, 6)), aligned(notes)])
 
 
-def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, FloatArray], dict[str, int]]:
+def predicted_column(
+    cases: Sequence[Case], column: str
+) -> tuple[dict[str, FloatArray], dict[str, int]]:
     """Predictions of the models for a column of the table of a sweep of N cases, such as ``velocity`` or ``sliding_1``.
 
     Returns values of each model by its name, m/s, shape (N,), NaN where it does not apply (none if no model has the
@@ -286,11 +344,15 @@ def predicted_column(cases: Sequence[Case], column: str) -> tuple[dict[str, Floa
         if reason := why_not_the_paper(case):
             reasons[f"{PAPER}: {reason}"] += 1
         else:
-            paper[place] = mean_velocity(dimer.gamma0(case.excitation.peak_acceleration), dimer.sin_delta)
+            paper[place] = mean_velocity(
+                dimer.gamma0(case.excitation.peak_acceleration), dimer.sin_delta
+            )
     models = {MODEL: model, PAPER: paper}
     if beyond := [sentence for case in cases if (sentence := outside_of_the_paper(case))]:
         reasons[beyond[0] + (", …" if len(beyond) > 1 else "")] = len(beyond)
-    return {name: values for name, values in models.items() if np.isfinite(values).any()}, dict(reasons)
+    return {name: values for name, values in models.items() if np.isfinite(values).any()}, dict(
+        reasons
+    )
 
 
 def _why_not(case: Case, column: str) -> str | None:

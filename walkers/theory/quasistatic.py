@@ -39,7 +39,9 @@ def inertia_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
     """The matrix G of M dv/dt = -M a (1, 1, 0) - G F∥ (their Eq. 3), solid spheres, shape (…, 3, 3)."""
     mu = mass_asymmetry(sin_delta)
     first, second, ones = 5.0 / (1.0 + mu), 5.0 / (1.0 - mu), np.ones_like(mu)
-    return _matrix([[1.0 + first, ones, first], [ones, 1.0 + second, second], [first, second, first + second]])
+    return _matrix(
+        [[1.0 + first, ones, first], [ones, 1.0 + second, second], [first, second, first + second]]
+    )
 
 
 def rolling_matrix(first: npt.ArrayLike, second: npt.ArrayLike) -> FloatArray:
@@ -101,11 +103,15 @@ def mean_velocity(gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike) -> FloatArray
     Γ0 and sin δ of beads of equal density may be of any shapes that broadcast. NaN where a contact would open
     (`detachment`), for there the model does not hold.
     """
-    gamma, s = np.broadcast_arrays(np.asarray(gamma0, np.float64), np.asarray(sin_delta, np.float64))
+    gamma, s = np.broadcast_arrays(
+        np.asarray(gamma0, np.float64), np.asarray(sin_delta, np.float64)
+    )
     parallel, pressed = _under_a_steady_force(s)
     sides = []
     for force in (np.sqrt(0.5) * gamma[..., None], -np.sqrt(0.5) * gamma[..., None]):
         normal = forces_at_rest(s) + force * pressed
-        sliding = force * parallel / (FRICTION_OF_THE_PAPER * np.where(normal > 0.0, normal, np.nan))
+        sliding = (
+            force * parallel / (FRICTION_OF_THE_PAPER * np.where(normal > 0.0, normal, np.nan))
+        )
         sides.append(translation(np.moveaxis(sliding, -1, 0)))
     return (sides[0] + sides[1]) / 2.0

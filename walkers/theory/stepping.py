@@ -10,7 +10,9 @@ from numba import njit
 from walkers.arrays import BoolArray, FloatArray
 
 Three = tuple[float, float, float]
-Effect = Callable[[Three, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
+Effect = Callable[
+    [Three, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]
+]
 
 FINER, LEVELS = 8, 3
 """A step in which a contact begins to stick or to slip is divided into 8 parts, and such a part into 8 again."""
@@ -106,20 +108,30 @@ def _advance(  # noqa: PLR0913, PLR0917
     """
     after, start = work[:4], (state[0, 0], state[0, 1], state[0, 2])
     after[:] = state
-    solved = _stage(tables[level], mu, drive, effect, terms, begin + STAGE * length, STAGE * length, start, work)
+    solved = _stage(
+        tables[level], mu, drive, effect, terms, begin + STAGE * length, STAGE * length, start, work
+    )
     # The second stage starts from where the slope of the first one leads.
-    start = _less(start, 1.0 - 1.0 / STAGE, _less((after[0, 0], after[0, 1], after[0, 2]), 1.0, start))
-    solved &= _stage(tables[level], mu, drive, effect, terms, begin + length, STAGE * length, start, work)
+    start = _less(
+        start, 1.0 - 1.0 / STAGE, _less((after[0, 0], after[0, 1], after[0, 2]), 1.0, start)
+    )
+    solved &= _stage(
+        tables[level], mu, drive, effect, terms, begin + length, STAGE * length, start, work
+    )
     if level < LEVELS - 1 and (not solved or (after[_MODE] != state[_MODE]).any()):
         part = length / FINER
         for number in range(FINER):
             now = begin + number * part
-            if not _advance(tables, mu, drive, effect, terms, now, part, level + 1, state, totals, work):
+            if not _advance(
+                tables, mu, drive, effect, terms, now, part, level + 1, state, totals, work
+            ):
                 return False
         return True
     if solved:
         for contact in range(3):
-            totals[0, contact] += length / 2.0 * (state[_SLIDING, contact] + after[_SLIDING, contact])
+            totals[0, contact] += (
+                length / 2.0 * (state[_SLIDING, contact] + after[_SLIDING, contact])
+            )
             totals[1, contact] = min(totals[1, contact], after[_NORMAL, contact])
         state[:] = after
     return solved
@@ -153,14 +165,18 @@ def _stage(  # noqa: PLR0913, PLR0917
     for contact in range(3):
         slips = state[_MODE, contact] != 0.0
         state[_SLIDING, contact] = (
-            free[contact] - seconds * _row(table, _GAIN + contact, state[_PARALLEL]) if slips else 0.0
+            free[contact] - seconds * _row(table, _GAIN + contact, state[_PARALLEL])
+            if slips
+            else 0.0
         )
         state[_NORMAL, contact] = rest[contact] + _row(table, _PRESS + contact, state[_PARALLEL])
     return solved
 
 
 @njit(cache=True)
-def _settle(table: FloatArray, mu: FloatArray, seconds: float, free: Three, rest: Three, work: FloatArray) -> bool:
+def _settle(
+    table: FloatArray, mu: FloatArray, seconds: float, free: Three, rest: Three, work: FloatArray
+) -> bool:
     """Find the friction forces and modes at the end of a stage, in place, by a semi-smooth Newton method.
 
     A contact sticks if the force that holds it is within the limit, else it slips (Alart and Curnier, Comput. Methods
@@ -176,7 +192,9 @@ def _settle(table: FloatArray, mu: FloatArray, seconds: float, free: Three, rest
             if abs(trial) <= normal * mu[contact]:
                 modes[contact] = 0.0
                 for column in range(3):
-                    rows[contact, column] = table[_GAIN + contact, column] / table[_GAIN + contact, contact]
+                    rows[contact, column] = (
+                        table[_GAIN + contact, column] / table[_GAIN + contact, contact]
+                    )
                 right[contact] = speed / scale
                 continue
             modes[contact] = np.sign(trial)
@@ -195,13 +213,21 @@ def _settle(table: FloatArray, mu: FloatArray, seconds: float, free: Three, rest
 
 @njit(cache=True)
 def _less(vector: Three, factor: float, change: Three) -> Three:
-    return vector[0] - factor * change[0], vector[1] - factor * change[1], vector[2] - factor * change[2]
+    return (
+        vector[0] - factor * change[0],
+        vector[1] - factor * change[1],
+        vector[2] - factor * change[2],
+    )
 
 
 @njit(cache=True)
 def _times(table: FloatArray, first: int, vector: FloatArray | Three) -> Three:
     """A matrix of a table, from its first row on, times a vector."""
-    return _row(table, first, vector), _row(table, first + 1, vector), _row(table, first + 2, vector)
+    return (
+        _row(table, first, vector),
+        _row(table, first + 1, vector),
+        _row(table, first + 2, vector),
+    )
 
 
 @njit(cache=True)

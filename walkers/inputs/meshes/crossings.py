@@ -63,11 +63,17 @@ def first_crossing(vessel: Vessel) -> Crossing | None:
             continue
         numbers = triangle_numbers[apart]
         ends, corners = edges[edge_numbers[apart]], vessel.triangles[numbers]
-        line, triangle, normal = vessel.points[ends], vessel.points[corners], vessel.normals[numbers]
+        line, triangle, normal = (
+            vessel.points[ends],
+            vessel.points[corners],
+            vessel.normals[numbers],
+        )
         heights = np.einsum("nkx,nx->nk", line - triangle[:, :1], normal)
         level = (np.abs(heights) < slack).all(axis=1)
         through = (heights.min(axis=1) < -slack) & (heights.max(axis=1) > slack)
-        through[through] = _goes_through(line[through], heights[through], triangle[through], normal[through], slack)
+        through[through] = _goes_through(
+            line[through], heights[through], triangle[through], normal[through], slack
+        )
         level[level] = _overlap_in_plane(line[level], triangle[level], normal[level], slack)
         if level.any():
             at = int(level.argmax())

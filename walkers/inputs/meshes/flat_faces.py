@@ -20,7 +20,9 @@ _FITS = 20  # planes that are fitted to a growing face at most
 class FlatFaces:
     """Triangles of a surface, joined to faces that are flat."""
 
-    def __init__(self, points: FloatArray, triangles: IntArray, spans: FloatArray, neighbours: IntArray) -> None:
+    def __init__(
+        self, points: FloatArray, triangles: IntArray, spans: FloatArray, neighbours: IntArray
+    ) -> None:
         """Of points (m), triangles, their normals of the length of twice their areas, and pairs with an edge."""
         self.points = points
         self.triangles = triangles

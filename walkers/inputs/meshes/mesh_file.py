@@ -23,7 +23,9 @@ MOST_TRIANGLES = 20_000
 """Triangles of a vessel at most."""
 MOST_BYTES = 64 << 20
 """Size of a mesh file at most, bytes: 20,000 triangles take 6 MB as text."""
-_LONGEST_READING = 2.0 * mesh_reader.MOST_SECONDS  # s; wall time, of a machine that does other work too
+_LONGEST_READING = (
+    2.0 * mesh_reader.MOST_SECONDS
+)  # s; wall time, of a machine that does other work too
 _LONGEST_REASON = 300  # letters of what a reader says
 _EXPECTED = "expected the surface of a vessel as STL, OBJ, PLY, OFF, VTP, VTU, VTK, or another format of meshio"
 
@@ -100,7 +102,9 @@ def _read_apart(path: Path) -> tuple[Any, Any]:
     if done.returncode == mesh_reader.READ_NOTHING:
         raise _unreadable(complaint or reason)
     if done.returncode < 0:
-        raise _unreadable(complaint or f"the reader was ended by signal {-done.returncode}, as by a damaged file")
+        raise _unreadable(
+            complaint or f"the reader was ended by signal {-done.returncode}, as by a damaged file"
+        )
     raise _unreadable(complaint or f"the reader ended with status {done.returncode}")
 
 

@@ -126,7 +126,9 @@ def _check_indices(groups: Iterable[npt.NDArray[np.int64]], count: int) -> None:
     for group in groups:
         wrong = group[(group < 0) | (group >= count)]
         if wrong.size:
-            raise ValueError(f"a polygon has the corner {wrong[0] + 1}, but there are {count} points")
+            raise ValueError(
+                f"a polygon has the corner {wrong[0] + 1}, but there are {count} points"
+            )
 
 
 def _triangles_of_polygons(points: FloatArray, polygons: Polygons) -> npt.NDArray[np.int64]:
@@ -142,7 +144,9 @@ def _triangles_of_polygons(points: FloatArray, polygons: Polygons) -> npt.NDArra
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     corners = np.concatenate([group.ravel() for group in polygons]).astype(np.int64)
     cells = vtkCellArray()
-    cells.SetData(support.numpy_to_vtkIdTypeArray(offsets, 1), support.numpy_to_vtkIdTypeArray(corners, 1))
+    cells.SetData(
+        support.numpy_to_vtkIdTypeArray(offsets, 1), support.numpy_to_vtkIdTypeArray(corners, 1)
+    )
     places = vtkPoints()
     places.SetData(support.numpy_to_vtk(np.ascontiguousarray(points), 1))
     surface = vtkPolyData()
@@ -236,7 +240,9 @@ def _check_other_files(path: Path) -> None:
         text = path.read_text(encoding="utf-8", errors="replace")
         for kind in re.findall(r'Format\s*=\s*["\'](\w+)', text):
             if kind.upper() != "XML":
-                raise ValueError(f'its data are in another file (Format="{kind}"); write them into it')
+                raise ValueError(
+                    f'its data are in another file (Format="{kind}"); write them into it'
+                )
     if path.suffix.lower() == ".inp" and re.search(rb"(?im)^\s*\*\s*include", path.read_bytes()):
         raise ValueError("it includes another file; write all into one")
 
@@ -312,7 +318,10 @@ def main(arguments: Sequence[str]) -> int:
     except MemoryError:
         sys.stdout.write(f"it takes more than {MOST_BYTES >> 30} GB to read")
         return REFUSED
-    except (Exception, SystemExit) as error:  # meshio ends the process where a file is not of its format
+    except (
+        Exception,
+        SystemExit,
+    ) as error:  # meshio ends the process where a file is not of its format
         sys.stdout.write(str(error))
         return READ_NOTHING if isinstance(error, (NothingRead, SystemExit)) else REFUSED
     arrays = BytesIO()

@@ -94,26 +94,39 @@ def _consistent(vessel: Vessel) -> Vessel:
     for edge, pair in vessel.sharing.items():
         if len(pair) > 2:
             middle = vessel.points[[*edge]].mean(axis=0)
-            raise _broken(f"has {len(pair)} triangles at an edge,", middle, "two: give sheets a thickness")
-    consistent = vessel.surface.compute_normals(point_normals=False, split_vertices=False, auto_orient_normals=False)
+            raise _broken(
+                f"has {len(pair)} triangles at an edge,", middle, "two: give sheets a thickness"
+            )
+    consistent = vessel.surface.compute_normals(
+        point_normals=False, split_vertices=False, auto_orient_normals=False
+    )
     turned = Vessel(vessel.points, np.asarray(consistent.regular_faces, dtype=np.int64))
     for pair in turned.sharing.values():
         if len(pair) == 2 and turned.ends(*pair[0]) == turned.ends(*pair[1]):
             where = turned.points[turned.triangles[pair[1][0], 0]]
-            raise _broken("has a surface of one side alone,", where, "one with an inside and an outside")
+            raise _broken(
+                "has a surface of one side alone,", where, "one with an inside and an outside"
+            )
     return turned
 
 
 def _check_rims(vessel: Vessel) -> None:
     """Refuse several openings."""
-    starts = Counter(vessel.ends(*shared[0])[0] for shared in vessel.sharing.values() if len(shared) == 1)
+    starts = Counter(
+        vessel.ends(*shared[0])[0] for shared in vessel.sharing.values() if len(shared) == 1
+    )
     for point, times in starts.items():
         if times > 1:
-            message = "has openings that meet in a point, or a corner within an edge of another part,"
+            message = (
+                "has openings that meet in a point, or a corner within an edge of another part,"
+            )
             raise _broken(message, vessel.points[point], _ONE_OPENING)
     rims = vessel.rims
     if len(rims) > 1:
-        lowest = min((vessel.points[rim][vessel.points[rim, 2].argmin()] for rim in rims), key=lambda point: point[2])
+        lowest = min(
+            (vessel.points[rim][vessel.points[rim, 2].argmin()] for rim in rims),
+            key=lambda point: point[2],
+        )
         raise _broken(f"has {len(rims)} openings, the lowest", lowest, _ONE_OPENING)
 
 
@@ -122,7 +135,9 @@ def _check_crossings(vessel: Vessel) -> None:
     crossing = first_fold(vessel) or first_crossing(vessel)
     if crossing:
         problem = "overlap in a plane" if crossing.level else "intersect"
-        raise _broken(f"has triangles that {problem},", crossing.place, "a surface that does not cross itself")
+        raise _broken(
+            f"has triangles that {problem},", crossing.place, "a surface that does not cross itself"
+        )
 
 
 def _toward_beads(vessel: Vessel) -> Vessel:
@@ -134,7 +149,9 @@ def _toward_beads(vessel: Vessel) -> Vessel:
     parts = np.append(vessel.parts, np.full(len(volumes) - len(vessel.parts), outer))
     sizes = np.bincount(parts, volumes)
     back = (sizes[vessel.parts] > 0.0) == vessel.outer
-    return Vessel(vessel.points, np.where(back[:, None], vessel.triangles[:, ::-1], vessel.triangles))
+    return Vessel(
+        vessel.points, np.where(back[:, None], vessel.triangles[:, ::-1], vessel.triangles)
+    )
 
 
 def _check_opening(vessel: Vessel) -> None:
@@ -145,7 +162,9 @@ def _check_opening(vessel: Vessel) -> None:
     extent = float(np.ptp(vessel.points, axis=0).max())
     lowest = rim[rim[:, 2].argmin()]
     if lowest[2] <= vessel.points[:, 2].min() + SAME_POINT * extent:
-        raise _broken("is open at its lowest point,", lowest, "a closed bottom: beads would fall out")
+        raise _broken(
+            "is open at its lowest point,", lowest, "a closed bottom: beads would fall out"
+        )
     facing = vessel.facing
     if facing[2] < cos(_STEEPEST_OPENING):
         axis = int(np.abs(facing).argmax())
@@ -181,7 +200,11 @@ def _without_hollows(vessel: Vessel) -> Vessel:
             inside = clear[np.abs(clear).argmax()] > 0.0
         if not inside:
             where = "above" if points[:, 2].min() >= outer.height else "beside"
-            raise _broken(f"has a closed part {where} the vessel,", farthest, "parts within it: one vessel a file")
+            raise _broken(
+                f"has a closed part {where} the vessel,",
+                farthest,
+                "parts within it: one vessel a file",
+            )
     hollow = [number for number in numbers if _is_in_another(vessel, corners, number)]
     return _restricted(vessel, vessel.triangles[~np.isin(vessel.parts, hollow)])
 
@@ -191,7 +214,9 @@ def _is_in_another(vessel: Vessel, corners: Mapping[int, IntArray], number: int)
     points = vessel.points[corners[number]]
     for body_number, body_corners in corners.items():
         around = vessel.points[body_corners]
-        apart = (points.min(axis=0) < around.min(axis=0)).any() or (points.max(axis=0) > around.max(axis=0)).any()
+        apart = (points.min(axis=0) < around.min(axis=0)).any() or (
+            points.max(axis=0) > around.max(axis=0)
+        ).any()
         if body_number == number or apart:
             continue
         body = Vessel(vessel.points, vessel.triangles[vessel.parts == body_number][:, ::-1])

@@ -33,7 +33,9 @@ def merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArra
 
     near = SAME_POINT * float(np.ptp(points, axis=0).max())
     pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
-    _, first, same = np.unique(groups_of(pairs, len(points)), return_index=True, return_inverse=True)
+    _, first, same = np.unique(
+        groups_of(pairs, len(points)), return_index=True, return_inverse=True
+    )
     triangles = same[triangles]
     sides = points[first][triangles] - np.roll(points[first][triangles], -1, axis=1)
     longest = np.linalg.norm(sides, axis=2).max(axis=1)
@@ -41,7 +43,9 @@ def merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArra
     _, once = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     triangles = triangles[[number for number in sorted(once) if wide[number]]]
     if not len(triangles):
-        raise unusable("boundary.mesh", "has no triangles of any size; expected the inner surface of a vessel")
+        raise unusable(
+            "boundary.mesh", "has no triangles of any size; expected the inner surface of a vessel"
+        )
     used, renumbered = np.unique(triangles, return_inverse=True)
     return points[first][used], renumbered.reshape(-1, 3)
 
@@ -63,7 +67,9 @@ def evaluated(function: Any, places: FloatArray) -> FloatArray:
     if not len(places):
         return np.zeros(0)
     values = vtkDoubleArray()
-    function.EvaluateFunction(support.numpy_to_vtk(np.ascontiguousarray(places, dtype=np.float64), 1), values)
+    function.EvaluateFunction(
+        support.numpy_to_vtk(np.ascontiguousarray(places, dtype=np.float64), 1), values
+    )
     return np.array(support.vtk_to_numpy(values))
 
 

@@ -23,7 +23,13 @@ import numpy.typing as npt
 from walkers.arrays import FloatArray, IntArray, Vector
 from walkers.inputs.meshes.facet import Facet, Half
 from walkers.inputs.meshes.flat_faces import FlatFaces
-from walkers.inputs.meshes.triangles import SAME_POINT, evaluated, groups_of, signed_distance, within_polygon
+from walkers.inputs.meshes.triangles import (
+    SAME_POINT,
+    evaluated,
+    groups_of,
+    signed_distance,
+    within_polygon,
+)
 from walkers.inputs.meshes.wall_names import names_of_faces, numbered, span_text
 
 if TYPE_CHECKING:
@@ -34,7 +40,10 @@ SHARP = radians(44.9)
 have a bridge to the other behind the edge. Its gap there is R/cos - R, at 45° 0.41 R, beyond the reach of bridges."""
 _LEVEL = cos(1e-3)
 _UPRIGHT = 1e-3  # largest vertical part of a normal
-_CLOSED, _ACROSS = -3e-308, -1e-12  # bounds of halves: the border is in it; triangles of one face overlap (m)
+_CLOSED, _ACROSS = (
+    -3e-308,
+    -1e-12,
+)  # bounds of halves: the border is in it; triangles of one face overlap (m)
 _NEAR = 0.3  # radii of a bead: how far the engine looks for facets
 _TOUCHING_BEADS = 200  # that stand for all when facets near beads are counted
 
@@ -68,7 +77,9 @@ class Vessel:
         triangles_at: dict[frozenset[int], list[tuple[int, int]]] = defaultdict(list)
         for number, corners in enumerate(self.triangles.tolist()):
             for side in range(3):
-                triangles_at[frozenset((corners[side], corners[(side + 1) % 3]))].append((number, side))
+                triangles_at[frozenset((corners[side], corners[(side + 1) % 3]))].append(
+                    (number, side)
+                )
         return dict(triangles_at)
 
     def ends(self, triangle: int, side: int) -> tuple[int, int]:
@@ -79,7 +90,9 @@ class Vessel:
     @cached_property
     def neighbours(self) -> IntArray:
         """Pairs of triangles with an edge in common, shape (E, 2)."""
-        pairs = [[triangle for triangle, _ in pair] for pair in self.sharing.values() if len(pair) == 2]
+        pairs = [
+            [triangle for triangle, _ in pair] for pair in self.sharing.values() if len(pair) == 2
+        ]
         return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
     @cached_property
@@ -154,7 +167,11 @@ class Vessel:
         """
         at_rim = np.isin(self.triangles, [point for rim in self.rims for point in rim]).any(axis=1)
         not_upright = (np.abs(self.face_normals[at_rim, 2]) > _UPRIGHT).any()
-        edges = [pair for pair in self.sharing.values() if len({self.faces[triangle] for triangle, _ in pair}) == 2]
+        edges = [
+            pair
+            for pair in self.sharing.values()
+            if len({self.faces[triangle] for triangle, _ in pair}) == 2
+        ]
         has_unfit_edge = any(
             self.face_normals[before] @ self.face_normals[after[0]] > cos(SHARP)
             or self._inwards[after] @ self.face_normals[before] <= 0.0
@@ -197,7 +214,9 @@ class Vessel:
             pair = self.sharing[frozenset((begin, end))]
             within = len(pair) == 2 and self.faces[pair[0][0]] == self.faces[pair[1][0]]
             bound = _ACROSS if within else _CLOSED
-            halves.append((_vector(self.points[begin]), _vector(self._inwards[triangle, side]), bound))
+            halves.append(
+                (_vector(self.points[begin]), _vector(self._inwards[triangle, side]), bound)
+            )
         return tuple(halves)
 
     def _standing_edges(self) -> list[list[tuple[int, int]]]:
@@ -231,12 +250,17 @@ class Vessel:
         for first, second in (tuple(edge) for edge in self.sharing):
             beside[first].add(second)
             beside[second].add(first)
-        corners = sorted({point for shared in self._standing_edges() for point in self.ends(*shared[0])})
-        names = numbered([f"corner {span_text([float(self.points[corner, 2])])}" for corner in corners])
+        corners = sorted(
+            {point for shared in self._standing_edges() for point in self.ends(*shared[0])}
+        )
+        names = numbered(
+            [f"corner {span_text([float(self.points[corner, 2])])}" for corner in corners]
+        )
         for corner, name in zip(corners, names, strict=True):
             at = self.points[corner]
             cell = tuple(
-                (_vector(at), _vector(at - self.points[neighbour]), _CLOSED) for neighbour in sorted(beside[corner])
+                (_vector(at), _vector(at - self.points[neighbour]), _CLOSED)
+                for neighbour in sorted(beside[corner])
             )
             yield Facet("corner", _vector(at), (0.0, 0.0, 0.0), (cell,), name)
 
@@ -245,7 +269,9 @@ class Vessel:
     @cached_property
     def rims(self) -> list[list[int]]:
         """Points along each opening, in the order of the triangles at it."""
-        follows = dict(self.ends(*shared[0]) for shared in self.sharing.values() if len(shared) == 1)
+        follows = dict(
+            self.ends(*shared[0]) for shared in self.sharing.values() if len(shared) == 1
+        )
         rims = []
         while follows:
             rims.append([first := next(iter(follows))])
@@ -256,7 +282,9 @@ class Vessel:
     @cached_property
     def height(self) -> float:
         """Of the lowest point of the rim, or of the top of a closed vessel, m."""
-        return float(min((self.points[rim, 2].min() for rim in self.rims), default=self.points[:, 2].max()))
+        return float(
+            min((self.points[rim, 2].min() for rim in self.rims), default=self.points[:, 2].max())
+        )
 
     @cached_property
     def facing(self) -> FloatArray:
@@ -264,7 +292,9 @@ class Vessel:
         if not self.rims:
             return np.zeros(3)
         around = self.points[self.rims[0]]
-        area = np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)  # clockwise, as seen from the beads
+        area = np.cross(around, np.roll(around, -1, axis=0)).sum(
+            axis=0
+        )  # clockwise, as seen from the beads
         facing: FloatArray = area / np.linalg.norm(area)
         return facing
 
@@ -289,7 +319,9 @@ class Vessel:
     def volume(self, level: float = inf) -> float:
         """Volume below a level (m), m³; a liquid higher than the lowest point of the rim runs out."""
         outward = Vessel(self.capped.points, self.capped.triangles[:, ::-1]).surface
-        return float(outward.clip_closed_surface("-z", origin=(0.0, 0.0, min(level, self.height))).volume)
+        return float(
+            outward.clip_closed_surface("-z", origin=(0.0, 0.0, min(level, self.height))).volume
+        )
 
     @cached_property
     def _distances(self) -> tuple[Any, Any, Any]:

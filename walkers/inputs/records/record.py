@@ -52,7 +52,9 @@ WINDOW = 8
 _SLOW = 4  # periods of the slowest line in a window for the slow part of the displacement
 STATIONARY = 0.1
 """Largest difference of local amplitudes of a stationary record, over the largest one."""
-_UNEVEN = 1.5  # longest time between two rows, in medians of all; longer where single rows are lost …
+_UNEVEN = (
+    1.5  # longest time between two rows, in medians of all; longer where single rows are lost …
+)
 _LOST = 2.5  # … up to this one …
 _MOST_LOST = 0.01  # … and for this share of all rows
 _REPEATED = 0.05  # share of times that repeat, from which on they have too few digits
@@ -61,8 +63,13 @@ _COARSE = 0.1  # largest change by leaving out every second row, root mean squar
 _FAINT = 0.05  # share of the strongest amplitude in the spectrum below which others do not count
 _BEATS = 16  # fewest beats of two lines in a record; the amplitude of one with fewer changes slowly
 _CONSTANT = 1e-9  # change of a dead sensor, over its value
-_TILT = 1.75e-3 * ACCELERATION_OF_ONE_G  # acceleration along a substrate that is tilted by 0.1°, m/s²
-_DISPLACEMENTS = 1e-9, 1.0  # smallest and largest amplitude of an electrodynamic shaker, with a margin, m
+_TILT = (
+    1.75e-3 * ACCELERATION_OF_ONE_G
+)  # acceleration along a substrate that is tilted by 0.1°, m/s²
+_DISPLACEMENTS = (
+    1e-9,
+    1.0,
+)  # smallest and largest amplitude of an electrodynamic shaker, with a margin, m
 
 
 class Record(Table):
@@ -114,7 +121,11 @@ class Record(Table):
     @property
     def axes(self) -> dict[str, int]:
         """The axes that are shaken, and their places among x, y and z."""
-        return {axis: place for place, axis in enumerate("xyz") if any(row[1 + place] for row in self.rows)}
+        return {
+            axis: place
+            for place, axis in enumerate("xyz")
+            if any(row[1 + place] for row in self.rows)
+        }
 
     def largest(self, order: int) -> float:
         """Largest displacement (order 0, m), velocity (1, m/s) or acceleration (2, m/s²) of the spline.
@@ -182,7 +193,8 @@ class Record(Table):
         lines = [
             number
             for number in range(2, len(spectrum) - 1)
-            if spectrum[number] > strong and spectrum[number - 1] <= spectrum[number] > spectrum[number + 1]
+            if spectrum[number] > strong
+            and spectrum[number - 1] <= spectrum[number] > spectrum[number + 1]
         ]
         return lines or [self._strongest]
 
@@ -279,10 +291,14 @@ class Record(Table):
         reasons = []
         if (error := self.uncertain_offset) > _TILT:
             periods = f"{self._lines[0]} periods of its slowest line"
-            reasons.append(f"drive.record has only {periods}: its offset is uncertain by {_as_tilt(error)}")
+            reasons.append(
+                f"drive.record has only {periods}: its offset is uncertain by {_as_tilt(error)}"
+            )
         if (change := self.change_of_offset) > 2.0 * _TILT:
             halves = "the offset of drive.record changes from its first to its second half"
-            reasons.append(f"{halves}: the rest acts as {_as_tilt(change / 2.0)}, first one way, then the other")
+            reasons.append(
+                f"{halves}: the rest acts as {_as_tilt(change / 2.0)}, first one way, then the other"
+            )
         return reasons
 
     @property
@@ -291,9 +307,13 @@ class Record(Table):
         lines = []
         if self.ignored_columns:
             names = ", ".join(f'"{name}"' for name in self.ignored_columns)
-            lines.append(f"drive.record: columns that are no acceleration along x, y or z are left out: {names}")
+            lines.append(
+                f"drive.record: columns that are no acceleration along x, y or z are left out: {names}"
+            )
         if lost := int(np.sum(_gaps(np.array(self.rows)[:, 0]))):
-            lines.append(f"drive.record lacks {counted(lost, 'row')}: the spline goes over the gaps")
+            lines.append(
+                f"drive.record lacks {counted(lost, 'row')}: the spline goes over the gaps"
+            )
         amplitude, (smallest, largest) = self.largest(0), _DISPLACEMENTS
         if not smallest < amplitude < largest:
             size = f"{self.frequencies[0]:.4g} Hz and an amplitude of {amplitude:.2g} m"
@@ -305,7 +325,10 @@ def course_text(times: FloatArray, powers: FloatArray, repeats: bool = False) ->
     """A course as the engine reads it: a period or 0, then each piece's time and powers, given the highest first."""
     powers = powers[::-1].tolist() + [[0.0] * powers.shape[1]] * (6 - len(powers))
     rows = zip(times.tolist(), *powers, strict=False)
-    return "\n".join([repr(float(times[-1] * repeats)), *(" ".join(map(repr, row)) for row in rows)]) + "\n"
+    return (
+        "\n".join([repr(float(times[-1] * repeats)), *(" ".join(map(repr, row)) for row in rows)])
+        + "\n"
+    )
 
 
 def _as_tilt(acceleration: float) -> str:
@@ -321,7 +344,9 @@ def _through(rows: FloatArray, repeats: bool = False) -> PPoly:
 
     if repeats:
         rows[-1, 1:] = rows[0, 1:]
-    return CubicSpline(rows[:, 0] - rows[0, 0], rows[:, 1:], bc_type="periodic" if repeats else "not-a-knot")
+    return CubicSpline(
+        rows[:, 0] - rows[0, 0], rows[:, 1:], bc_type="periodic" if repeats else "not-a-knot"
+    )
 
 
 def _without_offset(rows: FloatArray, repeats: bool = False) -> PPoly:
@@ -360,34 +385,46 @@ def _check(rows: Sequence[Sequence[float]]) -> None:
     if not FEWEST <= len(rows) <= MOST:
         raise ValueError(f"has {len(rows)} rows; expected {FEWEST} to {MOST}")
     array, largest = np.array(rows), ACCELERATION.largest
-    if (odd := ~np.isfinite(array).all(axis=1) | (np.abs(array[:, 1:]) > largest).any(axis=1)).any():
+    if (
+        odd := ~np.isfinite(array).all(axis=1) | (np.abs(array[:, 1:]) > largest).any(axis=1)
+    ).any():
         expected = f"expected a number in each column, accelerations up to {largest:g} m/s²"
         raise ValueError(f"row {np.argmax(odd) + 1}: {expected}")
     _check_times(array[:, 0])
     spread = np.ptp(array[:, 1:], axis=0)
     if (spread <= _CONSTANT * np.abs(array[:, 1:]).max(axis=0)).all():
-        raise ValueError("the acceleration is constant, as from a dead sensor; expected one that changes")
+        raise ValueError(
+            "the acceleration is constant, as from a dead sensor; expected one that changes"
+        )
     if spread.max() < 2.0 * ACCELERATION.smallest:
         amplitude = f"{spread.max() / 2.0:.2g} m/s²"
-        raise ValueError(f"expected an acceleration of {ACCELERATION.smallest:g} m/s² or more, found {amplitude}")
+        raise ValueError(
+            f"expected an acceleration of {ACCELERATION.smallest:g} m/s² or more, found {amplitude}"
+        )
     time = array[:, 0] - array[0, 0]
     from_half = _through(array[::2])(time)
     difference = (array[:, 1:] - from_half)[:-1]  # half of the rows may end before the last one
     change = float(np.linalg.norm(difference) / np.linalg.norm(_without_offset(array)(time)))
     if change > _COARSE:
         message = "rows are too far apart, or too noisy: leaving out every second one changes the acceleration by"
-        raise ValueError(f"{message} {change:.0%} (root mean square); expected at most {_COARSE:.0%}")
+        raise ValueError(
+            f"{message} {change:.0%} (root mean square); expected at most {_COARSE:.0%}"
+        )
 
 
 def _check_times(time: FloatArray) -> None:
     """Raise `ValueError` for times (s) that do not increase evenly."""
     steps = np.diff(time)
     if (steps < 0.0).all():
-        raise ValueError("times decrease from row to row; expected the first measurement in the first row")
+        raise ValueError(
+            "times decrease from row to row; expected the first measurement in the first row"
+        )
     repeated = steps == 0.0
     if repeated.mean() > _REPEATED and (steps >= 0.0).all():
         first = int(np.argmax(repeated)) + 1
-        coarse = f"times repeat: rows {first} and {first + 1} are both at {1e3 * time[first]:.6g} ms"
+        coarse = (
+            f"times repeat: rows {first} and {first + 1} are both at {1e3 * time[first]:.6g} ms"
+        )
         raise ValueError(f"{coarse}; expected times with more digits, such as whole microseconds")
     usual = np.median(steps)
     lost = (steps > _UNEVEN * usual) & (steps <= _LOST * usual)
@@ -395,5 +432,9 @@ def _check_times(time: FloatArray) -> None:
     if lost.sum() <= _MOST_LOST * len(time):
         odd &= ~lost
     if odd.any():
-        after = f"row {np.argmax(odd) + 2} is {1e3 * steps[np.argmax(odd)]:.6g} ms after the one before"
-        raise ValueError(f"{after}; expected times that increase without gaps, about {1e3 * usual:.6g} ms apart")
+        after = (
+            f"row {np.argmax(odd) + 2} is {1e3 * steps[np.argmax(odd)]:.6g} ms after the one before"
+        )
+        raise ValueError(
+            f"{after}; expected times that increase without gaps, about {1e3 * usual:.6g} ms apart"
+        )

@@ -19,7 +19,9 @@ from walkers.inputs.units import ACCELERATION, TIME, Kind, parse_quantity
 
 _MOST_BYTES = 64 << 20
 _EXAMPLE = '"time (ms), x (g), z (m/s^2)"'
-_EXPECTED_HEADER = f"expected a header that names the time and accelerations along x, y or z, such as {_EXAMPLE}"
+_EXPECTED_HEADER = (
+    f"expected a header that names the time and accelerations along x, y or z, such as {_EXAMPLE}"
+)
 _QUOTED = 60  # longest quotation of a line of the file, in letters
 _NAME_AND_UNIT = re.compile(r"(?P<name>[^\[\]()]*)[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
 _TIME_NAMES = frozenset({"t", "time", "timestamp"})
@@ -28,7 +30,9 @@ _AXIS_NAME = re.compile(
     r"|(?P<first>[xyz]) (acc|acceleration)"
 )
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
-_METRE_PER_SECOND_SQUARED = frozenset(("m/s2", "m/s^2", "m/s²", "m/s**2", "m/s/s", "m s-2", "m s^-2", "m·s⁻²", "ms^-2"))
+_METRE_PER_SECOND_SQUARED = frozenset(
+    ("m/s2", "m/s^2", "m/s²", "m/s**2", "m/s/s", "m s-2", "m s^-2", "m·s⁻²", "ms^-2")
+)
 
 
 class RecordContents(TypedDict):
@@ -89,7 +93,9 @@ def read_record(path: Path) -> RecordContents:
         raise ValueError(f"expected rows of numbers below a header: {error}") from error
     heads = _without_empty_end(header)
     columns, ignored = _columns_of(heads, lines[0])
-    numbers = [_row_of(row, number, heads, columns, separator) for number, row in enumerate(rows, 1)]
+    numbers = [
+        _row_of(row, number, heads, columns, separator) for number, row in enumerate(rows, 1)
+    ]
     if any("," in row[column.number] for row in rows for column in columns):
         _check_decimal_commas(rows, columns)
     return {"rows": numbers, "ignored_columns": ignored}
@@ -167,7 +173,9 @@ def _columns_of(heads: Sequence[str], line: str) -> tuple[list[_Column], list[st
     for place, quantity in enumerate(("time", *(f"acceleration along {axis}" for axis in "xyz"))):
         same = [f'"{column.head}"' for column in columns if column.place == place]
         if len(same) > 1:
-            raise ValueError(f"columns {' and '.join(same)} are both the {quantity}; expected one of them")
+            raise ValueError(
+                f"columns {' and '.join(same)} are both the {quantity}; expected one of them"
+            )
     places = {column.place for column in columns}
     if 0 not in places or len(places) < 2:
         quotation = line.strip() if len(line.strip()) <= _QUOTED else f"{line.strip()[:_QUOTED]}..."
@@ -206,7 +214,11 @@ def _factor_of(head: str, unit: str, kind: Kind) -> float:
 
 
 def _row_of(
-    fields: Sequence[str], number: int, heads: Sequence[str], columns: Sequence[_Column], separator: str
+    fields: Sequence[str],
+    number: int,
+    heads: Sequence[str],
+    columns: Sequence[_Column],
+    separator: str,
 ) -> list[float]:
     """A row of the record."""
     if len(_without_empty_end(fields)) > len(heads):
@@ -220,7 +232,9 @@ def _row_of(
         plain = text.replace(",", ".") if text.count(",") == 1 and "." not in text else text
         value = float(plain) if _NUMBER.fullmatch(plain) else float("nan")
         if not isfinite(value):
-            raise ValueError(f'row {number}: column "{column.head}" is "{text[:_QUOTED]}"; expected a number')
+            raise ValueError(
+                f'row {number}: column "{column.head}" is "{text[:_QUOTED]}"; expected a number'
+            )
         row[column.place] = value * column.factor
     return row
 

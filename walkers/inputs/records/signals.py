@@ -125,7 +125,9 @@ def periods_by_phase(samples: FloatArray, periods: float) -> float:
     weights = hann(half)
     apart = len(samples) - half
     for _ in range(2):
-        turned = samples * np.exp(-2j * pi * periods / len(samples) * np.arange(len(samples)))[:, None]
+        turned = (
+            samples * np.exp(-2j * pi * periods / len(samples) * np.arange(len(samples)))[:, None]
+        )
         first = weights @ turned[:half]
         second = weights @ turned[apart:]
         periods += float(np.angle(np.vdot(first, second))) / (2.0 * pi) * len(samples) / apart

@@ -120,14 +120,18 @@ def mixture_of(draft: MixtureDraft, boundary: Boundary, notes: Notes) -> Mixture
     if max(draft.small_radii) >= min(draft.large_radii):
         raise unusable("mixture.large", "expected radii above those of the small beads")
     if not boundary.closed:
-        raise unusable("boundary.shape", 'expected a container, such as "box": a mixture is poured into it')
+        raise unusable(
+            "boundary.shape", 'expected a container, such as "box": a mixture is poured into it'
+        )
     count = table.count
     if count is None:
         bed = boundary.geometry.volume(present(table.fill_height, "mixture.fill_height"))
         _, volume_of_bead = share_and_volume(table, draft.small_radii, draft.large_radii)
         count = round(_PACKING * bed / volume_of_bead)
         if not 1 <= count <= MOST_BEADS:
-            raise unusable("mixture.fill_height", f"that takes {count} beads; expected 1 to {MOST_BEADS}")
+            raise unusable(
+                "mixture.fill_height", f"that takes {count} beads; expected 1 to {MOST_BEADS}"
+            )
         notes.add("mixture.count", "from the fill_height")
     return table.completed(Mixture, {"small": draft.small, "large": draft.large, "count": count})
 
@@ -185,7 +189,9 @@ def _check_arrangement(cluster: WalkerGeometry, key: str) -> None:
         raise unusable(key, str(error)) from error
     if overlapping:
         first, second = (bead + 1 for bead in overlapping[0])
-        raise unusable(key, f"beads {first} and {second} would overlap in a {name}; expected similar radii")
+        raise unusable(
+            key, f"beads {first} and {second} would overlap in a {name}; expected similar radii"
+        )
 
 
 def _check_places(cluster: WalkerGeometry, key: str) -> None:
@@ -203,7 +209,10 @@ def _check_places(cluster: WalkerGeometry, key: str) -> None:
     for _ in everyone:
         joined |= {bead for pair in cluster.pairs if joined & {*pair} for bead in pair}
     if alone := everyone - joined:
-        raise unusable(f"{key}[{min(alone)}]", "expected beads that touch: this bead is not connected to the first")
+        raise unusable(
+            f"{key}[{min(alone)}]",
+            "expected beads that touch: this bead is not connected to the first",
+        )
 
 
 def automatic_spacing(
@@ -248,6 +257,10 @@ def _check_held(case: Case, walkers: Walkers) -> None:
     for name, load in zip(names, contact_loads(case, walkers), strict=True):
         if load.pull < 0.0 == load.overlap:  # no overlap: the load is tensile
             angle = case.liquid.contact_angle
-            key, remedy = ("contact_angle", "a smaller angle or less liquid") if angle else ("law", "a law that pulls")
+            key, remedy = (
+                ("contact_angle", "a smaller angle or less liquid")
+                if angle
+                else ("law", "a law that pulls")
+            )
             pushed = f"at rest, the bridge pushes {name} apart ({-1e6 * load.pull:.3g} uN)"
             raise unusable(f"liquid.{key}", f"expected {remedy}: {pushed}")

@@ -9,7 +9,14 @@ from walkers.errors import unusable
 from walkers.inputs.config_table import present
 from walkers.inputs.resolving.notes import Notes
 from walkers.inputs.tables.boundary import Boundary
-from walkers.inputs.tables.drive import Drive, DriveTable, Harmonic, HarmonicTable, check_drive, common_frequency
+from walkers.inputs.tables.drive import (
+    Drive,
+    DriveTable,
+    Harmonic,
+    HarmonicTable,
+    check_drive,
+    common_frequency,
+)
 from walkers.inputs.units import ACCELERATION, quantity_text
 from walkers.physics.dimer import Dimer
 
@@ -78,7 +85,9 @@ def _check_harmonics(drive: Drive) -> None:
     try:
         common_frequency([harmonic.frequency for harmonic in excitation.harmonics])
     except ValueError as error:
-        raise unusable("drive.harmonics", f"expected frequencies with a common period: {error}") from error
+        raise unusable(
+            "drive.harmonics", f"expected frequencies with a common period: {error}"
+        ) from error
     if drive.frame == "lab" and not excitation.is_plain:
         message = "several harmonics, or one with a phase, are driven in the container's frame"
         raise unusable("drive.frame", f'expected "container": {message}')
@@ -91,7 +100,9 @@ def _recorded_drive(table: DriveTable, notes: Notes) -> Drive:
     record = present(excitation.record, "drive.record")
     first, last = (record.rows[end][1:] for end in (0, -1))
     if record.repeats and dist(first, last) > _MEET * record.largest(2):
-        raise unusable("drive.repeats", "expected a record that ends with the first row of the next period")
+        raise unusable(
+            "drive.repeats", "expected a record that ends with the first row of the next period"
+        )
     check_drive(excitation)
     why = "all lines are multiples" if record.repeats else "the strongest line"
     frequency = f"{excitation.frequency:.6g} Hz"

@@ -32,7 +32,9 @@ SUPPLIED = ("beads.density", *OF_LIQUIDS, *_FRICTION[:2], *ROUGHNESS, *_OF_SURFA
 """Keys that a case may leave out because the library has values or defaults."""
 
 
-def supplied(document: Mapping[str, Any], library: Library) -> tuple[dict[str, Any], dict[str, Source], list[Problem]]:
+def supplied(
+    document: Mapping[str, Any], library: Library
+) -> tuple[dict[str, Any], dict[str, Source], list[Problem]]:
     """The tables of a case with missing values from the library, their sources, and names that it does not know."""
     given = {key for key in SUPPLIED if value_at(document, parts_of(key)) is not MISSING}
     named = (value_at(document, parts_of(key)) for key in NAMES)
@@ -49,18 +51,27 @@ def supplied(document: Mapping[str, Any], library: Library) -> tuple[dict[str, A
     for key in SUPPLIED:
         replaced = {key, *alternatives(CaseFile, key)} & {*given, *written}
         if key in values and not replaced and isinstance(tables.get(key.split(".")[0]), Mapping):
-            written[key], sources[key] = values[key].written, _source_of(key, values[key], calibrated)
+            written[key], sources[key] = (
+                values[key].written,
+                _source_of(key, values[key], calibrated),
+            )
     return changed(CaseFile, tables, written), sources, problems
 
 
 def _unknown(library: Library, given: set[str], names: Sequence[str | None]) -> list[Problem]:
     """Names that are not in the library and that the case does not describe completely itself."""
     described, problems = given.issuperset(_FRICTION), []
-    complete = (described and "beads.density" in given, described, any(given.issuperset(keys) for keys in _LIQUIDS))
+    complete = (
+        described and "beads.density" in given,
+        described,
+        any(given.issuperset(keys) for keys in _LIQUIDS),
+    )
     for key, name, says_all in zip(NAMES, names, complete, strict=True):
         kind = "liquids" if key == "liquid.name" else "materials"
         if name is not None and not says_all and name not in library.names(kind):
-            expected = f"nor in a library.toml beside the case; {expected_of(name, library.names(kind))}"
+            expected = (
+                f"nor in a library.toml beside the case; {expected_of(name, library.names(kind))}"
+            )
             problems.append(Problem(key, shown(name), f"not in the library, {expected}"))
     return problems
 
@@ -72,12 +83,18 @@ def _mixture(
     keys = ("liquid.mass_fraction", "liquid.temperature")
     share, temperature = (value_at(document, parts_of(key)) for key in keys)
     if liquid not in MIXTURES:
-        extra = [key for key, value in zip(keys, (share, temperature), strict=True) if value is not MISSING]
+        extra = [
+            key
+            for key, value in zip(keys, (share, temperature), strict=True)
+            if value is not MISSING
+        ]
         message = f'expected none: it is for name = "{next(iter(MIXTURES))}"'
         return None, {}, [Problem(key, None, message) for key in extra]
     if type(share) not in (int, float) or not 0 <= share <= 1:
         missing = "missing; " if share is MISSING else ""
-        message = f"{missing}expected the mass of the glycerol over that of the mixture, such as 0.87"
+        message = (
+            f"{missing}expected the mass of the glycerol over that of the mixture, such as 0.87"
+        )
         return None, {}, [Problem(keys[0], None, message)]
     text = "20 degC" if temperature is MISSING else str(temperature)
     sources = {keys[1]: Source("default", text=text)} if temperature is MISSING else {}
@@ -89,7 +106,11 @@ def _mixture(
 
 @lru_cache(maxsize=1024)
 def _values(
-    library: Library, bead: str | None, wall: str | None, liquid: str | None, mixture: tuple[float, float] | None
+    library: Library,
+    bead: str | None,
+    wall: str | None,
+    liquid: str | None,
+    mixture: tuple[float, float] | None,
 ) -> dict[str, LibraryNumber]:
     """Defaults, and numbers of the library for materials and a liquid, by the keys of a case."""
     on_bead, on_wall = library.surface_pair(bead, bead), library.surface_pair(bead, wall)
@@ -98,7 +119,10 @@ def _values(
         "beads.density": library.numbers("materials", bead or "").get("density"),
         "contact.friction.bead_bead": on_bead.get("friction"),
         "contact.friction.bead_wall": on_wall.get("friction"),
-        **{key: library.roughness(bead, material) for key, material in zip(ROUGHNESS, (bead, wall), strict=True)},
+        **{
+            key: library.roughness(bead, material)
+            for key, material in zip(ROUGHNESS, (bead, wall), strict=True)
+        },
         **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
         **{f"liquid.{key}": number for key, number in of_liquid.items()},
     }
@@ -114,5 +138,7 @@ def _source_of(key: str, entry: LibraryNumber, liquid: str | None) -> Source:
     if usual is None or (entry.source and not entry.calibrated_with):
         return Source(entry.origin, entry.source, text, entry.range, logarithmic)
     if liquid in entry.calibrated_with:
-        return Source("calibrated" if entry.range else "assumed", entry.source, text, entry.range, logarithmic)
+        return Source(
+            "calibrated" if entry.range else "assumed", entry.source, text, entry.range, logarithmic
+        )
     return Source("default", entry.source, text, usual.range, logarithmic)

@@ -151,7 +151,11 @@ def cycles_of(table: RunTable, drive: Excitation, cycles_per_sample: int) -> int
 
 def _sources(run: Run, case: Setup, reason: str) -> dict[str, Source]:
     """Sources of the values of a run that its table does not give."""
-    cycles_from, cycles, settling = "from the duration" if run.duration else "not checked earlier", "", ""
+    cycles_from, cycles, settling = (
+        "from the duration" if run.duration else "not checked earlier",
+        "",
+        "",
+    )
     if case.excitation.ends and not run.duration:
         cycles_from = f"of the {case.excitation.length:.4g} s of the record"
     if run.until_steady:
@@ -163,7 +167,9 @@ def _sources(run: Run, case: Setup, reason: str) -> dict[str, Source]:
         cycles_from += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
     by_time = case.loose or bool(run.frames_per_second)
     sources = {
-        "run.samples_per_cycle": Source("derived" if by_time else "default", "from frames_per_second" * by_time, often),
+        "run.samples_per_cycle": Source(
+            "derived" if by_time else "default", "from frames_per_second" * by_time, often
+        ),
         "run.time_step": Source("derived", f"auto: {reason}, a whole number of steps per cycle"),
         "run.cycles": Source("derived", cycles_from, cycles),
         "run.settling_cycles": Source("derived", "a third of the cycles, at most 20", settling),
@@ -171,7 +177,9 @@ def _sources(run: Run, case: Setup, reason: str) -> dict[str, Source]:
         "run.settled_below": Source("default"),
     }
     if case.loose:
-        length = units.quantity_text(run.cycles_per_segment / case.excitation.frequency, units.DURATION)
+        length = units.quantity_text(
+            run.cycles_per_segment / case.excitation.frequency, units.DURATION
+        )
         sources["run.segment"] = Source("derived", "about 0.5 s", length)
     if not case.walkers:
         sources["run.settling_cycles"] = Source("default", "of loose beads")
@@ -180,24 +188,44 @@ def _sources(run: Run, case: Setup, reason: str) -> dict[str, Source]:
 
 def _check_length(case: Setup, run: Run, longest: float) -> None:
     """Refuse a run that is too short or too long for what is measured, for its drive, or for the engine (cycles)."""
-    drive, cycles, settling, every = case.excitation, run.cycles, run.settling_cycles, run.cycles_per_sample
+    drive, cycles, settling, every = (
+        case.excitation,
+        run.cycles,
+        run.settling_cycles,
+        run.cycles_per_sample,
+    )
     (fewest, most), name = drive.cycles, "run.cycles" if run.duration is None else "run.duration"
     if run.until and case.mixture is None:
-        raise unusable("run.until", "expected none: only clusters of a [mixture] climb out of a pile")
+        raise unusable(
+            "run.until", "expected none: only clusters of a [mixture] climb out of a pile"
+        )
     if cycles < 2:
-        raise unusable(name, f"expected at least two cycles of the drive, {2.0 / drive.frequency:.4g} s")
+        raise unusable(
+            name, f"expected at least two cycles of the drive, {2.0 / drive.frequency:.4g} s"
+        )
     if cycles - settling < 2:
         raise unusable("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
     if case.walkers and cycles // every <= run.settled_strobes:
         message = f"expected more: one frame in {every} cycles leaves none after {settling} settling cycles"
         raise unusable("run.frames_per_second", message)
-    if drive.record and (apart := drive.record.length / (len(drive.record.rows) - 1)) < run.time_step:
+    if (
+        drive.record
+        and (apart := drive.record.length / (len(drive.record.rows) - 1)) < run.time_step
+    ):
         rows = f"its rows, {1e6 * apart:.3g} us apart, are closer than the time step, {1e6 * run.time_step:.3g} us"
-        raise unusable("drive.record", f"{rows}; expected fewer rows, or a shorter run.time_step", drive.record.file)
+        raise unusable(
+            "drive.record",
+            f"{rows}; expected fewer rows, or a shorter run.time_step",
+            drive.record.file,
+        )
     if cycles < fewest:
-        raise unusable(name, f"expected at least {ceil(fewest)} cycles, {drive.ramp[-1][0]:g} s, of drive.ramp")
+        raise unusable(
+            name, f"expected at least {ceil(fewest)} cycles, {drive.ramp[-1][0]:g} s, of drive.ramp"
+        )
     if cycles > most + 1e-9:
-        message = "drive.record has no more; drive.repeats = true repeats one that ends as it begins"
+        message = (
+            "drive.record has no more; drive.repeats = true repeats one that ends as it begins"
+        )
         raise unusable(name, f"expected at most {int(most)} cycles: {message}")
     if cycles > longest:
         limit = f"{longest}" if run.duration is None else f"{longest // drive.frequency:g} s"
@@ -231,15 +259,27 @@ def _until_steady(case: Setup, cycles_per_sample: int) -> bool:
     table = case.run
     until = ["cycles"] if "cycles" in table.model_fields_set and table.cycles is None else []
     until += ["most_cycles"] if table.most_cycles is not None else []
-    given = [name for name in ("cycles", "duration", "settling_cycles", "segment") if getattr(table, name) is not None]
+    given = [
+        name
+        for name in ("cycles", "duration", "settling_cycles", "segment")
+        if getattr(table, name) is not None
+    ]
     if given and until:
-        message = f"expected none: with run.{until[0]}, walkers run until their velocity is constant"
+        message = (
+            f"expected none: with run.{until[0]}, walkers run until their velocity is constant"
+        )
         raise unusable(f"run.{given[0]}", message)
     if until and not case.apart:
-        raise unusable(f"run.{until[0]}", "expected run.duration: a run until steady needs independent walkers")
+        raise unusable(
+            f"run.{until[0]}", "expected run.duration: a run until steady needs independent walkers"
+        )
     if until and case.excitation.changes:
-        changing = "with drive.ramp" if case.drive.ramp else "with the changing amplitude of drive.record"
-        raise unusable(f"run.{until[0]}", f"expected a number of cycles: {changing} no velocity is constant")
+        changing = (
+            "with drive.ramp" if case.drive.ramp else "with the changing amplitude of drive.record"
+        )
+        raise unusable(
+            f"run.{until[0]}", f"expected a number of cycles: {changing} no velocity is constant"
+        )
     if case.excitation.ends and not until:
         return False
     if case.drive.ramp or not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:

@@ -32,7 +32,9 @@ class Sourced(Table, Generic[Q]):
 
     @field_validator("range")
     @classmethod
-    def _has_the_value(cls, ends: tuple[Any, Any] | None, of: ValidationInfo) -> tuple[Any, Any] | None:
+    def _has_the_value(
+        cls, ends: tuple[Any, Any] | None, of: ValidationInfo
+    ) -> tuple[Any, Any] | None:
         if ends is not None and not ends[0] < ends[1]:
             raise ValueError("expected the lower end first: [low, high]")
         if ends is not None and "value" in of.data and not ends[0] <= of.data["value"] <= ends[1]:

@@ -53,7 +53,9 @@ def _at_rest(law: BridgeLaw, surfaces: Surfaces) -> Load:
     return Load(surfaces, float(pull[0]), curve.rupture)
 
 
-def resistances_at_rest(case: Setup, radius: float, other_radius: float) -> tuple[float, float, float]:
+def resistances_at_rest(
+    case: Setup, radius: float, other_radius: float
+) -> tuple[float, float, float]:
     """S (N s/m), C (N s) and Q (N m s) of that bridge, the smaller bead as body 1 (`walkers.physics.bridge`)."""
     touching = case.law(surfaces_of(case, radius, other_radius)).forces(np.zeros(1))
     _, _, sliding, coupling, rolling = map(float, touching.columns()[0])
@@ -146,13 +148,17 @@ def _loads_of_loose_beads(case: Setup) -> list[Load]:
     if case.mixture is not None:
         radii |= {*case.mixture.small_radii, *case.mixture.large_radii}
     pairs = combinations_with_replacement([*sorted(radii), inf], 2)
-    return [_with_overlap(case, bridge_at_rest(case, *pair)) for pair in pairs if pair != (inf, inf)]
+    return [
+        _with_overlap(case, bridge_at_rest(case, *pair)) for pair in pairs if pair != (inf, inf)
+    ]
 
 
 def _with_overlap(case: Setup, bridge: Load, weight: float = 0.0) -> Load:
     """A bridge with the overlap at which the repulsion balances its pull and a weight, N."""
     modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
-    return bridge._replace(overlap=hertz_overlap(bridge.pull + weight, bridge.surfaces.reduced_radius, modulus))
+    return bridge._replace(
+        overlap=hertz_overlap(bridge.pull + weight, bridge.surfaces.reduced_radius, modulus)
+    )
 
 
 def _largest_delay(case: Setup, loads: Iterable[Load]) -> float:
@@ -207,4 +213,6 @@ def hop_height(case: Case) -> float:
     """Height that a bead thrown up at twice the substrate's peak velocity reaches, m (its reach without gravity)."""
     if case.pressing_gravity <= 0.0:
         return reach(case)
-    return min((2.0 * case.excitation.peak_velocity) ** 2 / (2.0 * case.pressing_gravity), reach(case))
+    return min(
+        (2.0 * case.excitation.peak_velocity) ** 2 / (2.0 * case.pressing_gravity), reach(case)
+    )

@@ -62,7 +62,10 @@ def with_vessel(
         boundary, vessel = _of_planes(boundary)
     width, size = float(f"{2.0 * abs(vessel.points[:, :2]).max():.12g}"), 2.0 * largest
     if not 1.0 < width / size < _WIDEST:
-        wide, across = (f"{length:.4g} m" if length >= 1.0 else f"{1e3 * length:.4g} mm" for length in (width, size))
+        wide, across = (
+            f"{length:.4g} m" if length >= 1.0 else f"{1e3 * length:.4g} mm"
+            for length in (width, size)
+        )
         message = f"the vessel is {wide} wide and the beads {across}; expected 1 to {_WIDEST:g} beads across"
         raise unusable("boundary.scale" if boundary.mesh else "boundary.planes", message)
     notes.add("boundary.width", why)
@@ -89,9 +92,14 @@ def _of_planes(boundary: Boundary) -> tuple[Boundary, Vessel]:
     boundary = boundary.but(planes=_planes(boundary.planes))
     vessel = boundary.but(shape="vessel").vessel
     if abs(lowest := float(vessel.points[:, 2].min())) > 1e-9:
-        raise unusable("boundary.planes", f"have their lowest point at z = {1e3 * lowest:.4g} mm; expected 0 mm")
+        raise unusable(
+            "boundary.planes",
+            f"have their lowest point at z = {1e3 * lowest:.4g} mm; expected 0 mm",
+        )
     if (top := vessel.height) < (1.0 - 1e-9) * present(boundary.height, "boundary.height"):
-        raise unusable("boundary.height", f"the planes close the vessel; expected at most {1e3 * top:.4g} mm")
+        raise unusable(
+            "boundary.height", f"the planes close the vessel; expected at most {1e3 * top:.4g} mm"
+        )
     return boundary, vessel
 
 
@@ -102,10 +110,18 @@ def _planes(planes: Sequence[Plane]) -> tuple[Plane, ...]:
         try:
             units.append(plane.but(normal=unit_vector(plane.normal)))
         except ValueError as error:
-            raise unusable(f"boundary.planes[{number}].normal", "expected a direction such as [0, 0, 1]") from error
+            raise unusable(
+                f"boundary.planes[{number}].normal", "expected a direction such as [0, 0, 1]"
+            ) from error
     for (number, first), (index, second) in combinations(enumerate(units), 2):
-        turn = acos(max(-1.0, min(1.0, sum(a * b for a, b in zip(first.normal, second.normal, strict=True)))))
+        turn = acos(
+            max(
+                -1.0, min(1.0, sum(a * b for a, b in zip(first.normal, second.normal, strict=True)))
+            )
+        )
         if turn < SHARP:
             message = f"turns by {degrees(turn):.3g} deg from planes[{number}]; expected 45 deg or more, or a mesh"
             raise unusable(f"boundary.planes[{index}].normal", message)
-    return tuple(sorted(units, key=lambda plane: plane.normal != BOTTOM.normal or plane.point[2] != 0.0))
+    return tuple(
+        sorted(units, key=lambda plane: plane.normal != BOTTOM.normal or plane.point[2] != 0.0)
+    )

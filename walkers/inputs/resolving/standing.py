@@ -55,7 +55,10 @@ def standing(case: Case) -> Iterator[tuple[int, Standing]]:
         else:
             yield number, _poured(case, body)
     if case.placed:
-        yield len(case.bodies), Standing(tuple(StandingBead(*bead.at, bead.radius) for bead in case.placed))
+        yield (
+            len(case.bodies),
+            Standing(tuple(StandingBead(*bead.at, bead.radius) for bead in case.placed)),
+        )
 
 
 def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
@@ -69,15 +72,24 @@ def _walkers(case: Case, walkers: Walkers, first: int) -> Iterator[Standing]:
         row = number // case.shifted_rows if case.shifted_rows else 0
         facing = {"right": 1, "left": -1}.get(walkers.facing, 1 if (number + row) % 2 == 0 else -1)
         turn, press = _draws(case.run.seed, number)
-        angle, factor = walkers.angle + walkers.angle_spread * turn, 1.0 + walkers.gap_spread * press
+        angle, factor = (
+            walkers.angle + walkers.angle_spread * turn,
+            1.0 + walkers.gap_spread * press,
+        )
         overlaps = [overlap * factor for overlap in resting]
         heading = atan2(y, x) + angle + (0.0 if facing > 0 else pi)
-        pressed = zip(walkers.radii, overlaps, strict=False)  # the first overlaps are those with the floor
-        heights = [case.boundary.geometry.rest_height(radius - overlap) for radius, overlap in pressed]
+        pressed = zip(
+            walkers.radii, overlaps, strict=False
+        )  # the first overlaps are those with the floor
+        heights = [
+            case.boundary.geometry.rest_height(radius - overlap) for radius, overlap in pressed
+        ]
         ahead, left = cos(heading), sin(heading)
         beads = [
             StandingBead(along * ahead - aside * left, along * left + aside * ahead, *rest)
-            for (along, aside), *rest in zip(walkers.places(heights, overlaps), heights, walkers.radii, strict=True)
+            for (along, aside), *rest in zip(
+                walkers.places(heights, overlaps), heights, walkers.radii, strict=True
+            )
         ]
         yield Standing(tuple(beads), facing, angle)
 
@@ -92,10 +104,18 @@ def _poured(case: Case, mixture: Mixture) -> Standing:
     """Beads on a loose lattice with random order and displacements (seed of the case); they fall and settle."""
     largest, draw = max(mixture.radii), default_rng(case.run.seed)
     floor, beads = _top_of_others(case), []
-    places = ((layer, x, y) for layer in case.boundary.geometry.layers(largest, floor) for x, y in layer.places)
-    for radius, (layer, x, y) in zip((float(size) for size in draw.permutation(mixture.all_radii)), places):  # noqa: B905
+    places = (
+        (layer, x, y)
+        for layer in case.boundary.geometry.layers(largest, floor)
+        for x, y in layer.places
+    )
+    for radius, (layer, x, y) in zip(
+        (float(size) for size in draw.permutation(mixture.all_radii)), places
+    ):  # noqa: B905
         shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * layer.play(radius, largest)
-        beads.append(StandingBead(x + float(shift[0]), y + float(shift[1]), floor + layer.level, radius))
+        beads.append(
+            StandingBead(x + float(shift[0]), y + float(shift[1]), floor + layer.level, radius)
+        )
     return Standing(tuple(beads))
 
 
@@ -111,13 +131,20 @@ def check_bodies(case: Case) -> None:
     if boundary.shape == "vessel":
         _check_vessel(case)
     if case.run.ranks > 1 and not boundary.closed:
-        raise unusable("run.ranks", "expected 1: walkers on a plane run slower on several processes")
+        raise unusable(
+            "run.ranks", "expected 1: walkers on a plane run slower on several processes"
+        )
     if not case.walkers and mixture is None and "seed" in case.document.get("run", {}):
         raise unusable("run.seed", "expected none with placed beads: every start would be the same")
     if case.liquid.conserved and case.liquid.meniscus_radius is not None:
-        raise unusable("liquid.conserved", "expected false: menisci of one radius exchange liquid through a film")
+        raise unusable(
+            "liquid.conserved",
+            "expected false: menisci of one radius exchange liquid through a film",
+        )
     if case.liquid.conserved and (case.walkers or not boundary.closed):
-        raise unusable("liquid.conserved", "expected false: only loose beads in a container share their liquid")
+        raise unusable(
+            "liquid.conserved", "expected false: only loose beads in a container share their liquid"
+        )
     if mixture is not None:
         boundary.geometry.check_pour(mixture.count, max(mixture.radii), _top_of_others(case))
     if case.placed or case.meets or (case.walkers and not boundary.bare):
@@ -135,7 +162,10 @@ def _check_vessel(case: Case) -> None:
         most = f"at most {_MOST_PARTS // case.count} for {case.count} beads: a coarser mesh"
         raise unusable(blamed, f"has {walls} faces, edges and corners; expected {most}")
     if case.walkers and boundary.walls[0].name != FLOOR:
-        raise unusable(blamed, "has no level floor at its bottom, on which walkers stand; expected [[placed]] beads")
+        raise unusable(
+            blamed,
+            "has no level floor at its bottom, on which walkers stand; expected [[placed]] beads",
+        )
 
 
 class _Held(NamedTuple):
@@ -150,11 +180,22 @@ class _Held(NamedTuple):
 def _held(case: Case) -> list[_Held]:
     """The beads of walkers, then those that are placed."""
     keys = [key for key, walkers in case.walkers_by_key.items() for _ in range(walkers.replicates)]
-    grid = case.boundary.geometry.grid(len(keys), max(walkers.spacing for walkers in case.walkers)) if keys else []
+    grid = (
+        case.boundary.geometry.grid(len(keys), max(walkers.spacing for walkers in case.walkers))
+        if keys
+        else []
+    )
     beads: list[_Held] = []
-    for number, (key, (x, y), (_, walker)) in enumerate(zip(keys, grid, standing(case), strict=False)):
-        beads += [_Held(key, (x + bead.x, y + bead.y, bead.z), bead.radius, number) for bead in walker.beads]
-    return beads + [_Held(f"placed[{number}]", bead.at, bead.radius) for number, bead in enumerate(case.placed)]
+    for number, (key, (x, y), (_, walker)) in enumerate(
+        zip(keys, grid, standing(case), strict=False)
+    ):
+        beads += [
+            _Held(key, (x + bead.x, y + bead.y, bead.z), bead.radius, number)
+            for bead in walker.beads
+        ]
+    return beads + [
+        _Held(f"placed[{number}]", bead.at, bead.radius) for number, bead in enumerate(case.placed)
+    ]
 
 
 def _cut_by_walls(case: Case, beads: list[_Held]) -> list[_Held]:
@@ -162,25 +203,42 @@ def _cut_by_walls(case: Case, beads: list[_Held]) -> list[_Held]:
     places = np.array([bead.place for bead in beads])
     clearances = case.boundary.geometry.side_clearance(places)
     if case.walkers:
-        clearances = np.where(np.isfinite(case.boundary.walls[0].distances(places)), clearances, -1.0)
-    return [bead for bead, clear in zip(beads, clearances, strict=True) if clear < (1.0 - OVERLAP) * bead.radius]
+        clearances = np.where(
+            np.isfinite(case.boundary.walls[0].distances(places)), clearances, -1.0
+        )
+    return [
+        bead
+        for bead, clear in zip(beads, clearances, strict=True)
+        if clear < (1.0 - OVERLAP) * bead.radius
+    ]
 
 
 def _check_walls(case: Case, beads: list[_Held]) -> None:
     boundary, top = case.boundary, case.boundary.height or inf
     largest = max((max(walkers.radii) for walkers in case.walkers), default=0.0)
     if boundary.width is not None and boundary.width < 2.0 * (1.0 - OVERLAP) * largest:
-        raise unusable("boundary.width", f"expected more than a bead's diameter, {2e3 * largest:.4g} mm")
+        raise unusable(
+            "boundary.width", f"expected more than a bead's diameter, {2e3 * largest:.4g} mm"
+        )
     cut = _cut_by_walls(case, beads)
     if cut and cut[0].walker >= 0:
-        number = case.walkers_by_key[cut[0].key].replicates  # also a default, which no document quotes
+        number = case.walkers_by_key[
+            cut[0].key
+        ].replicates  # also a default, which no document quotes
         raise unusable(f"{cut[0].key}.replicates", _expected_number(case, cut[0].key), number)
     high = [bead for bead in beads if bead.place[2] + bead.radius > top]
     if walking := [bead for bead in high if bead.walker >= 0]:
         highest = max(walking, key=lambda bead: bead.place[2] + bead.radius)
-        least = f"{ceil(1e6 * (highest.place[2] + highest.radius)) / 1e3:g} mm"  # a number that will do
-        raise unusable("boundary.height", f"too low for the walkers of {highest.key}; expected at least {least}")
-    low = [bead for bead in beads if bead.walker < 0 and bead.place[2] < (1.0 - OVERLAP) * bead.radius]
+        least = (
+            f"{ceil(1e6 * (highest.place[2] + highest.radius)) / 1e3:g} mm"  # a number that will do
+        )
+        raise unusable(
+            "boundary.height",
+            f"too low for the walkers of {highest.key}; expected at least {least}",
+        )
+    low = [
+        bead for bead in beads if bead.walker < 0 and bead.place[2] < (1.0 - OVERLAP) * bead.radius
+    ]
     if out := [*cut, *high, *low]:
         raise unusable(f"{out[0].key}.at", "expected a bead within the boundary")
 
@@ -202,8 +260,14 @@ def _expected_number(case: Case, key: str) -> str:
 def _check_overlaps(beads: list[_Held]) -> None:
     from scipy.spatial import cKDTree
 
-    near = cKDTree([bead.place for bead in beads]).query_pairs(2.0 * max(bead.radius for bead in beads))
-    strangers = (pair for pair in near if beads[pair[0]].walker != beads[pair[1]].walker or beads[pair[0]].walker < 0)
+    near = cKDTree([bead.place for bead in beads]).query_pairs(
+        2.0 * max(bead.radius for bead in beads)
+    )
+    strangers = (
+        pair
+        for pair in near
+        if beads[pair[0]].walker != beads[pair[1]].walker or beads[pair[0]].walker < 0
+    )
     for pair in sorted(strangers, key=lambda pair: pair[::-1]):
         first, second = (beads[number] for number in pair)
         apart, touching = dist(first.place, second.place), first.radius + second.radius
@@ -217,5 +281,8 @@ def _check_overlaps(beads: list[_Held]) -> None:
 
 def overlaps(whom: str, apart: float, touching: float) -> str:
     """A message about a bead at a distance (m) from another, which it touches at a larger distance (m)."""
-    by, expected = f"{1e3 * (touching - apart):.3g} mm", f"expected their centres {1e3 * touching:.4g} mm apart"
+    by, expected = (
+        f"{1e3 * (touching - apart):.3g} mm",
+        f"expected their centres {1e3 * touching:.4g} mm apart",
+    )
     return f"overlaps with {whom} by {by}; {expected}, where they touch"

@@ -137,7 +137,10 @@ def _liquid(liquid: LiquidTable, notes: Notes) -> Liquid:
     viscosity = liquid.dynamic_viscosity
     if liquid.kinematic_viscosity is not None:
         if liquid.density is None:
-            raise unusable("liquid.density", "missing; expected the liquid's density beside its kinematic_viscosity")
+            raise unusable(
+                "liquid.density",
+                "missing; expected the liquid's density beside its kinematic_viscosity",
+            )
         viscosity = float(f"{liquid.kinematic_viscosity * liquid.density:.15g}")
         notes.add("liquid.dynamic_viscosity", "from kinematic_viscosity and density")
     return liquid.completed(Liquid, {"dynamic_viscosity": viscosity})
@@ -149,14 +152,18 @@ def _check_surfaces(case: Setup, notes: Notes) -> None:
     roughness = case.contact.roughness
     for key, value in zip(ROUGHNESS, (roughness.bead_bead, roughness.bead_wall), strict=True):
         if value > most * (1.0 + 1e-9):
-            raise unusable(key, f"expected {1e6 * most:.3g} um or less, a hundredth of a bead's radius")
+            raise unusable(
+                key, f"expected {1e6 * most:.3g} um or less, a hundredth of a bead's radius"
+            )
         _end_range_at(key, most, notes)
     try:
         for radius in case.radii if liquid.meniscus_radius else ():
             for opposite in (*case.radii, inf):
                 bridge_volume(radius, opposite, liquid)
     except ValueError as error:
-        raise unusable("liquid.meniscus_radius", f"expected menisci that fit between the surfaces: {error}") from error
+        raise unusable(
+            "liquid.meniscus_radius", f"expected menisci that fit between the surfaces: {error}"
+        ) from error
 
 
 def _end_range_at(key: str, most: float, notes: Notes) -> None:
@@ -191,7 +198,9 @@ def _hardened(softened: Setup, notes: Notes) -> Setup:
         if softened.mixture is not None and _longest_step(harder) < _longest_step(softened):
             break
         softened = harder
-    notes.add("contact.youngs_modulus", f"auto: bridges delay contacts by {delay_of(softened):.1g} rad")
+    notes.add(
+        "contact.youngs_modulus", f"auto: bridges delay contacts by {delay_of(softened):.1g} rad"
+    )
     return softened
 
 

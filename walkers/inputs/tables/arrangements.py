@@ -79,7 +79,9 @@ def _ring(radii: Sequence[float], apart: Apart) -> Places:
         return [2.0 * asin(min(chord / (2.0 * radius), 1.0)) for chord in chords]
 
     if sum(turns(low)) < 2.0 * pi:
-        raise ValueError("these beads do not form a closed ring; expected more beads, or more similar radii")
+        raise ValueError(
+            "these beads do not form a closed ring; expected more beads, or more similar radii"
+        )
     for _ in range(200):
         middle = (low + high) / 2.0
         low, high = (middle, high) if sum(turns(middle)) > 2.0 * pi else (low, middle)
@@ -165,7 +167,9 @@ class WalkerGeometry:
         along = [place[0] for place in self.design]
         middle = sum(along) / len(along)
         largest = max(abs(place - middle) for place in along)
-        if largest < 1e-9 * self.length:  # all side by side: it faces the way that is to the right of their row
+        if (
+            largest < 1e-9 * self.length
+        ):  # all side by side: it faces the way that is to the right of their row
             return tuple(0.0 for _ in along)
         return tuple((place - middle) / largest for place in along)
 
@@ -189,10 +193,16 @@ class WalkerGeometry:
         """Positions of the beads of a walker in its frame, from heights and overlaps, m."""
         if self.at:
             return list(self.at)
-        overlap_of = {pair: overlaps[len(self.radii) + number] for number, pair in enumerate(self.pairs)}
+        overlap_of = {
+            pair: overlaps[len(self.radii) + number] for number, pair in enumerate(self.pairs)
+        }
 
         def apart(first: int, second: int) -> float:
-            between = self.radii[first] + self.radii[second] - overlap_of[min(first, second), max(first, second)]
+            between = (
+                self.radii[first]
+                + self.radii[second]
+                - overlap_of[min(first, second), max(first, second)]
+            )
             if between < abs(heights[first] - heights[second]):
                 message = "the radii differ too much: the beads do not touch when they rest on the boundary"
                 raise ValueError(f"{message}; expected more similar radii")

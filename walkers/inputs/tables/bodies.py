@@ -45,17 +45,27 @@ class WalkersTable(Table):
     ``angle``. At the start, forces balance at all contacts. The first of the ``radii`` belongs to the leading bead.
     """
 
-    replicates: Whole = key("Number of walkers, each with a small random perturbation at the start.", 6, ge=1, le=1000)
+    replicates: Whole = key(
+        "Number of walkers, each with a small random perturbation at the start.", 6, ge=1, le=1000
+    )
     facing: Literal["both", "right", "left", "up", "down"] = key(
-        "Direction along the drive axis: `right` or `up`, `left` or `down`, or alternately `both`.", "both"
+        "Direction along the drive axis: `right` or `up`, `left` or `down`, or alternately `both`.",
+        "both",
     )
     angle: units.Angle = key("Angle at the start between the whole walker and that direction.", 0.0)
-    angle_spread: units.NonNegativeAngle = key("Range of the random angle at the start: `angle` ± this.", pi / 180.0)
-    gap_spread: Number = key("Range of the random factor of the overlap of each walker: 1 ± this.", 0.2, ge=0, lt=1)
-    spacing: Annotated[Length | None, units.AUTO] = key(
-        "Distance between the walkers. `auto`: they do not meet; with `meet`, they do not touch at the start.", None
+    angle_spread: units.NonNegativeAngle = key(
+        "Range of the random angle at the start: `angle` ± this.", pi / 180.0
     )
-    meet: units.Flag = key("Whether the walkers may meet. If not, a meeting gives a warning.", False)
+    gap_spread: Number = key(
+        "Range of the random factor of the overlap of each walker: 1 ± this.", 0.2, ge=0, lt=1
+    )
+    spacing: Annotated[Length | None, units.AUTO] = key(
+        "Distance between the walkers. `auto`: they do not meet; with `meet`, they do not touch at the start.",
+        None,
+    )
+    meet: units.Flag = key(
+        "Whether the walkers may meet. If not, a meeting gives a warning.", False
+    )
 
 
 class Walkers(WalkerGeometry, WalkersTable):
@@ -73,10 +83,18 @@ class DimersTable(WalkersTable):
     """``[dimers]``: walkers of two beads."""
 
     choices: ClassVar = (Choice(("radii",), ("diameters",), ("mean_radius", "sin_delta")),)
-    radii: tuple[Radius, Radius] | None = key("Radii of the beads. The first bead leads.", None, ["0.3 mm", "0.2 mm"])
-    diameters: Indirect[tuple[Diameter, Diameter]] = key("Diameters, instead of `radii`.", None, ["0.6 mm", "0.4 mm"])
-    mean_radius: Indirect[Radius] = key("Mean radius, with `sin_delta` instead of `radii`.", None, "0.25 mm")
-    sin_delta: Indirect[Number] = key("Asymmetry of a dimer, sin δ = (R1 − R2)/(R1 + R2).", None, 0.2, gt=-0.9, lt=0.9)
+    radii: tuple[Radius, Radius] | None = key(
+        "Radii of the beads. The first bead leads.", None, ["0.3 mm", "0.2 mm"]
+    )
+    diameters: Indirect[tuple[Diameter, Diameter]] = key(
+        "Diameters, instead of `radii`.", None, ["0.6 mm", "0.4 mm"]
+    )
+    mean_radius: Indirect[Radius] = key(
+        "Mean radius, with `sin_delta` instead of `radii`.", None, "0.25 mm"
+    )
+    sin_delta: Indirect[Number] = key(
+        "Asymmetry of a dimer, sin δ = (R1 − R2)/(R1 + R2).", None, 0.2, gt=-0.9, lt=0.9
+    )
 
 
 class Dimers(Walkers, DimersTable):
@@ -96,7 +114,9 @@ class ClusterTable(WalkersTable):
     choices: ClassVar = (Choice(("radii",), ("diameters",)), Choice(("arrangement",), ("at",)))
     radii: _Radii | None = key("Radii of the beads. The first bead leads.", None, _THREE[0])
     diameters: Indirect[_Diameters] = key("Diameters, instead of `radii`.", None, _THREE[1])
-    arrangement: str = key("`chain`, `fan`, `diamond` or `ring`. See [](../cases.md#bodies).", "", "fan")
+    arrangement: str = key(
+        "`chain`, `fan`, `diamond` or `ring`. See [](../cases.md#bodies).", "", "fan"
+    )
     at: Annotated[tuple[_Place, ...], Field(max_length=100)] = key(
         "Place of each bead, distance ahead and to the left, instead of an arrangement.",
         (),
@@ -120,13 +140,19 @@ class MixtureTable(Table):
     )
     small: _Range | None = key("Range of radii of the small beads.", None, ["0.3 mm", "0.315 mm"])
     large: _Range | None = key("Range of radii of the large beads.", None, ["0.5 mm", "0.59 mm"])
-    small_diameters: Indirect[_DiameterRange] = key("Diameters, instead of `small`.", None, ["0.6 mm", "0.63 mm"])
-    large_diameters: Indirect[_DiameterRange] = key("Diameters, instead of `large`.", None, ["1 mm", "1.18 mm"])
+    small_diameters: Indirect[_DiameterRange] = key(
+        "Diameters, instead of `small`.", None, ["0.6 mm", "0.63 mm"]
+    )
+    large_diameters: Indirect[_DiameterRange] = key(
+        "Diameters, instead of `large`.", None, ["1 mm", "1.18 mm"]
+    )
     small_share: Number = key("Share of the small beads.", 0.5, ge=0, le=1)
     mixed_by: Literal["mass", "number"] = key("Quantity that `small_share` refers to.", "mass")
     sizes: Whole = key("Number of different radii in each range.", 4, ge=1, le=20)
     count: Whole | None = key("Number of beads.", None, 200, ge=1, le=MOST_BEADS)
-    fill_height: Indirect[Length] = key("Height of the bed, instead of a number of beads.", None, "3 mm")
+    fill_height: Indirect[Length] = key(
+        "Height of the bed, instead of a number of beads.", None, "3 mm"
+    )
 
 
 class Mixture(MixtureTable):
@@ -182,7 +208,11 @@ class Mixture(MixtureTable):
 def middles_of(ends: tuple[float, float], number: int) -> tuple[float, ...]:
     """The middles of equal shares of a range of radii, m."""
     low, high = ends
-    return tuple(dict.fromkeys(float(f"{low + (high - low) * (k + 0.5) / number:.12g}") for k in range(number)))
+    return tuple(
+        dict.fromkeys(
+            float(f"{low + (high - low) * (k + 0.5) / number:.12g}") for k in range(number)
+        )
+    )
 
 
 def share_and_volume(
@@ -204,7 +234,8 @@ class PlacedBeadTable(Table):
     radius: Radius | None = key("Radius of the bead.", None, "0.3 mm")
     diameter: Indirect[Diameter] = key("Diameter of the bead, instead of `radius`.", None, "0.6 mm")
     at: Position = key(
-        "Centre of the bead at the start: x, y, z from the middle of the floor.", example=["5 mm", "-3 mm", "0.3 mm"]
+        "Centre of the bead at the start: x, y, z from the middle of the floor.",
+        example=["5 mm", "-3 mm", "0.3 mm"],
     )
 
 

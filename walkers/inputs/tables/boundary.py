@@ -32,26 +32,37 @@ class Boundary(Table):
 
     shape: ShapeName = key("Shape of the boundary. See [](../cases.md#boundaries).", "plane")
     material: Annotated[str, SAME_RUN] = key(
-        "Material, from the library, or any other name beside all friction coefficients.", ..., "glass"
+        "Material, from the library, or any other name beside all friction coefficients.",
+        ...,
+        "glass",
     )
-    opening: Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)] | None = key(
-        "Angle between the two walls of a groove.", None, "120 deg"
+    opening: (
+        Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)]
+        | None
+    ) = key("Angle between the two walls of a groove.", None, "120 deg")
+    width: units.Length | None = key(
+        "Width of a channel; inner side or diameter of a container.", None, "5.3 mm"
     )
-    width: units.Length | None = key("Width of a channel; inner side or diameter of a container.", None, "5.3 mm")
-    height: units.Length | None = key("Height of a container. Beads are lost above twice this height.", None, "5.3 mm")
+    height: units.Length | None = key(
+        "Height of a container. Beads are lost above twice this height.", None, "5.3 mm"
+    )
     mesh: Indirect[str] = key(
         "File of a vessel of your own: its inner surface, or a solid, as STL, OBJ, PLY, VTP or in another format.",
         None,
         "funnel.stl",
     )
     scale: Indirect[units.Length] = key("Length of the unit of the mesh file.", None, "1 mm")
-    planes: tuple[Plane, ...] = key("Planes around the beads, up to the `height`, instead of a mesh.", ())
+    planes: tuple[Plane, ...] = key(
+        "Planes around the beads, up to the `height`, instead of a mesh.", ()
+    )
     points: Derived[tuple[Vector, ...]] = ()
     triangles: Derived[tuple[tuple[int, int, int], ...]] = ()
     tilt: Annotated[float, replace(units.ANGLE, largest=1.5708, sign=_SLOPE)] = key(
         'Tilt of the floor: 0° is level, 90° is a wall. `uphill = "180 deg"` turns the slope.', 0.0
     )
-    uphill: units.Angle = key("Direction of the steepest ascent, measured within the floor from the drive axis.", 0.0)
+    uphill: units.Angle = key(
+        "Direction of the steepest ascent, measured within the floor from the drive axis.", 0.0
+    )
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:

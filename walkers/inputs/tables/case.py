@@ -37,7 +37,14 @@ from walkers.inputs.tables.bodies import (
 )
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.drive import AXES, Drive, DriveTable, Excitation
-from walkers.inputs.tables.materials import Beads, Contact, ContactTable, Environment, Liquid, LiquidTable
+from walkers.inputs.tables.materials import (
+    Beads,
+    Contact,
+    ContactTable,
+    Environment,
+    Liquid,
+    LiquidTable,
+)
 from walkers.inputs.tables.run import Run, RunTable, settling_of
 from walkers.inputs.units import kind_in
 from walkers.physics.bridge import BridgeLaw
@@ -47,7 +54,9 @@ def _ranges(value: object) -> object:
     """Ranges by dotted keys."""
     if not isinstance(value, dict):
         return value
-    return {name: ends if is_axis(ends) else {"uniform": ends} for name, ends in flatten(value).items()}
+    return {
+        name: ends if is_axis(ends) else {"uniform": ends} for name, ends in flatten(value).items()
+    }
 
 
 Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
@@ -64,7 +73,9 @@ _ABOUT = ("document", "sources", "recorded_law", "uncertain")
 class CaseFile(Table):
     """A case file: bodies on a boundary under a drive, with a liquid and contacts."""
 
-    title: Annotated[str, SAME_RUN] = key("Title of figures and reports. It does not change the results.", "")
+    title: Annotated[str, SAME_RUN] = key(
+        "Title of figures and reports. It does not change the results.", ""
+    )
     beads: Beads = key("")
     dimers: DimersTable | None = key("", None)
     clusters: Annotated[tuple[ClusterTable, ...], _FEW_KINDS] = key("", ())
@@ -86,7 +97,11 @@ class CaseFile(Table):
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
         """Bodies that are missing, and the length of a run of loose beads."""
         if not any(body in given for body in _BODIES):
-            yield Problem("dimers", None, "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]")
+            yield Problem(
+                "dimers",
+                None,
+                "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]",
+            )
         run, loose = given.get("run", {}), given.keys() & {"mixture", "placed"}
         if loose and isinstance(run, Mapping) and not run.keys() & {"duration", "cycles"}:
             yield RunTable.missing("duration", "run")
@@ -111,7 +126,10 @@ class Setup(CaseFile):
     def walkers_by_key(self) -> dict[str, Walkers]:
         """All makes of walkers by their keys, dimers first."""
         dimers: dict[str, Walkers] = {} if self.dimers is None else {"dimers": self.dimers}
-        return {**dimers, **{f"clusters[{number}]": cluster for number, cluster in enumerate(self.clusters)}}
+        return {
+            **dimers,
+            **{f"clusters[{number}]": cluster for number, cluster in enumerate(self.clusters)},
+        }
 
     @cached_property
     def walkers(self) -> tuple[Walkers, ...]:
@@ -167,7 +185,9 @@ class Setup(CaseFile):
             return (max(self.mixture.small_radii) + min(self.mixture.large_radii)) / 2.0
         sizes = sorted(self.radii)
         middle = (sizes[0] + sizes[-1]) / 2.0
-        small, large = ([size for size in sizes if (size > middle) is above] for above in (False, True))
+        small, large = (
+            [size for size in sizes if (size > middle) is above] for above in (False, True)
+        )
         return (small[-1] + large[0]) / 2.0 if large else inf
 
     @property
@@ -186,7 +206,12 @@ class Setup(CaseFile):
         both = [walkers for walkers in self.walkers if walkers.facing == "both"]
         if not self.meets or all(isclose(walkers.angle_spread, pi) for walkers in both):
             return 0
-        rows = [x for x, _ in self.boundary.geometry.grid(sum(walkers.replicates for walkers in self.walkers), 1.0)]
+        rows = [
+            x
+            for x, _ in self.boundary.geometry.grid(
+                sum(walkers.replicates for walkers in self.walkers), 1.0
+            )
+        ]
         length = rows.count(rows[0])
         return length if length % 2 == 0 and length < len(rows) else 0
 
@@ -217,7 +242,10 @@ class Setup(CaseFile):
     @property
     def axial_gravity(self) -> float:
         """Component of gravity against the drive axis, m/s²."""
-        return -sum(component * along for component, along in zip(self.gravity_vector, self.drive_axis, strict=True))
+        return -sum(
+            component * along
+            for component, along in zip(self.gravity_vector, self.drive_axis, strict=True)
+        )
 
 
 class Case(Setup):
@@ -245,7 +273,11 @@ class Case(Setup):
         """The same case with a fixed number of cycles in one segment."""
         if not self.run.until_steady:
             return self
-        fixed = {"until_steady": False, "settling_cycles": settling_of(cycles), "cycles_per_segment": cycles}
+        fixed = {
+            "until_steady": False,
+            "settling_cycles": settling_of(cycles),
+            "cycles_per_segment": cycles,
+        }
         return self.but(run=self.run.but(cycles=cycles, **fixed))
 
     @cached_property
@@ -256,7 +288,10 @@ class Case(Setup):
             in_no_file = ("title", "uncertain", "drive.record.rows", "drive.record.ignored_columns")
             if name in in_no_file or name.startswith(("placed[", "boundary.planes[")):
                 continue
-            raw, kind = value_at(self.document, parts_of(name)), kind_in([*field.metadata, field.annotation])
+            raw, kind = (
+                value_at(self.document, parts_of(name)),
+                kind_in([*field.metadata, field.annotation]),
+            )
             if raw is not MISSING and not units.is_auto(raw):
                 # The step of the run is a little shorter, so that it fits into a cycle.
                 limit = units.parse_quantity(raw, units.TIME) if name == "run.time_step" else value
@@ -272,13 +307,19 @@ class Case(Setup):
             ((distribution, (low, high)),) = given.items()
             # What has no line of its own, such as one of two radii, has one if the case calls it uncertain.
             raw = value_at(self.document, parts_of(name))
-            origin = origins.get(name) or Origin(name, "-" if raw is MISSING else text_of(raw), "given")
+            origin = origins.get(name) or Origin(
+                name, "-" if raw is MISSING else text_of(raw), "given"
+            )
             logarithmic = distribution == "loguniform"
-            origins[name] = replace(origin, range=(low, high), logarithmic=logarithmic, uncertain=True)
+            origins[name] = replace(
+                origin, range=(low, high), logarithmic=logarithmic, uncertain=True
+            )
         return tuple(origins.values())
 
     def __repr__(self) -> str:
-        given = ", ".join(f"{origin.key} = {origin.text}" for origin in self.origins if origin.origin == "given")
+        given = ", ".join(
+            f"{origin.key} = {origin.text}" for origin in self.origins if origin.origin == "given"
+        )
         return f"<Case {self.name}: {given}>"
 
     __str__ = __repr__
@@ -286,7 +327,9 @@ class Case(Setup):
     def _repr_html_(self) -> str:
         """All values with their origins, for notebooks."""
         cells = ([origin.key, origin.text, origin.word, origin.source] for origin in self.origins)
-        rows = "".join(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in cells)
+        rows = "".join(
+            f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in cells
+        )
         return f"<table><caption>{escape(self.title or self.name)}</caption>{rows}</table>"
 
     @property

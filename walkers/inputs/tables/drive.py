@@ -36,7 +36,9 @@ WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
     "sawtooth": tuple((k, 2.0 / pi / k * (-1.0) ** (k + 1)) for k in range(1, 10)),
 }
 """Of the acceleration: multiples of the frequency and shares of the peak. A triangle's series is cut at 0.96 of it."""
-_LINE_ALONE = 0.95  # share of the largest acceleration of a record below which its line is named beside it
+_LINE_ALONE = (
+    0.95  # share of the largest acceleration of a record below which its line is named beside it
+)
 _FEW = 3
 _FEW_ENOUGH = Field(max_length=24)
 _SAME_TIME = 1e-9  # relative error of times, and of numbers of cycles
@@ -56,7 +58,9 @@ def _axis(value: object) -> object:
 
 
 _VECTOR = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
-_Direction = Annotated[str | Vector, BeforeValidator(_axis), WithJsonSchema({"anyOf": [{"enum": list(AXES)}, _VECTOR]})]
+_Direction = Annotated[
+    str | Vector, BeforeValidator(_axis), WithJsonSchema({"anyOf": [{"enum": list(AXES)}, _VECTOR]})
+]
 _Recorded = Annotated[Any, BeforeValidator(record_of), WithJsonSchema({"type": "string"})]
 Ramp = tuple[tuple[float, float], ...]
 
@@ -81,9 +85,13 @@ class _SineTable(Table):
     """A sine A sin(2π f t + φ) along a direction: its keys in ``[drive]`` and in ``[[drive.harmonics]]``."""
 
     choices: ClassVar[tuple[Choice, ...]] = (Choice(("peak_acceleration",), ("gamma0",)),)
-    axis: _Direction | None = key("Direction of the shaking. Default: `x`; in containers `z`.", None)
+    axis: _Direction | None = key(
+        "Direction of the shaking. Default: `x`; in containers `z`.", None
+    )
     frequency: units.Frequency | None = key("Frequency in cycles per second.", None)
-    peak_acceleration: units.Acceleration | None = key("Peak acceleration of the boundary; `g` is 9.8 m/s².", None)
+    peak_acceleration: units.Acceleration | None = key(
+        "Peak acceleration of the boundary; `g` is 9.8 m/s².", None
+    )
     gamma0: Indirect[Coefficient] = key(
         "Γ0 = a0 M/(4πγR̄) of the dimer of mass M and mean radius R̄, instead of a0.", None, 0.5
     )
@@ -138,7 +146,8 @@ class DriveTable(_SineTable):
         Choice(("waveform",), ("record",), required=False),
     )
     waveform: Literal["sine", "triangle", "sawtooth"] = key(
-        "Waveform of the acceleration. `triangle` and `sawtooth` contain harmonics up to the 9th.", "sine"
+        "Waveform of the acceleration. `triangle` and `sawtooth` contain harmonics up to the 9th.",
+        "sine",
     )
     frame: Frame = key(
         "`container`: the beads feel the inertial force. `lab`: the boundary moves. Velocities agree within 10⁻⁶.",
@@ -150,7 +159,9 @@ class DriveTable(_SineTable):
         None,
         "trace.csv",
     )
-    repeats: units.Flag | None = key("Whether the record is a period, which repeats. Default: false.", None)
+    repeats: units.Flag | None = key(
+        "Whether the record is a period, which repeats. Default: false.", None
+    )
     ramp: _Factors = key(
         "Times after the start of the drive and factors of the displacement, which is linear in between.",
         (),
@@ -164,8 +175,12 @@ class DriveTable(_SineTable):
             yield from super().problems(given, place)
             return
         for name in sorted(given.keys() & {*HarmonicTable.model_fields, "waveform", "record"}):
-            instead = f": write {place}.harmonics[0].{name}" if name in HarmonicTable.model_fields else ""
-            yield Problem(f"{place}.{name}", None, f"expected none beside {place}.harmonics{instead}")
+            instead = (
+                f": write {place}.harmonics[0].{name}" if name in HarmonicTable.model_fields else ""
+            )
+            yield Problem(
+                f"{place}.{name}", None, f"expected none beside {place}.harmonics{instead}"
+            )
 
 
 class Drive(DriveTable):
@@ -180,7 +195,9 @@ class Drive(DriveTable):
     def excitation(self) -> Excitation:
         """The sum of sines that the keys describe, or the record."""
         if self.record:
-            return Excitation((), self.frame, self.record.but(repeats=bool(self.repeats)), self.ramp)
+            return Excitation(
+                (), self.frame, self.record.but(repeats=bool(self.repeats)), self.ramp
+            )
         if self.harmonics:
             harmonics = tuple(_sine(harmonic) for harmonic in self.harmonics)
         else:
@@ -220,7 +237,9 @@ class Excitation:
     @property
     def peak_acceleration(self) -> float:
         """Peak acceleration of the largest harmonic or of the record at the ramp's largest factor, m/s²."""
-        return self.largest_factor * (self.record.largest(2) if self.record else self.largest.peak_acceleration)
+        return self.largest_factor * (
+            self.record.largest(2) if self.record else self.largest.peak_acceleration
+        )
 
     @property
     def is_plain(self) -> bool:
@@ -237,18 +256,30 @@ class Excitation:
     @property
     def fastest(self) -> float:
         """The highest frequency, Hz."""
-        return self.record.frequencies[1] if self.record else max(sine.frequency for sine in self.harmonics)
+        return (
+            self.record.frequencies[1]
+            if self.record
+            else max(sine.frequency for sine in self.harmonics)
+        )
 
     @property
     def amplitude(self) -> float:
         """Largest displacement that the harmonics could add up to, or of a record without its slow part, m."""
-        largest = self.record.largest(0) if self.record else sum(sine.amplitude for sine in self.harmonics)
+        largest = (
+            self.record.largest(0)
+            if self.record
+            else sum(sine.amplitude for sine in self.harmonics)
+        )
         return self.largest_factor * largest
 
     @property
     def peak_velocity(self) -> float:
         """Largest speed that the harmonics could add up to, or of a record without its slow part, m/s."""
-        largest = self.record.largest(1) if self.record else sum(sine.peak_velocity for sine in self.harmonics)
+        largest = (
+            self.record.largest(1)
+            if self.record
+            else sum(sine.peak_velocity for sine in self.harmonics)
+        )
         return self.largest_factor * largest
 
     @property
@@ -306,10 +337,21 @@ class Excitation:
 
         times, factors = np.array(self.ramp or ((0.0, 1.0),)).T
         cycle, far = 1.0 / self.frequency, (times[0] - 9.0, times[-1] + 9.0)
-        even = make_interp_spline([far[0], *times, far[1]], [factors[0], *factors, factors[-1]], k=1).antiderivative()
-        knots = np.unique([far[0] + cycle, *(times - cycle / 2.0), *(times + cycle / 2.0), far[1] - cycle])
-        places = ((knots[1:] + knots[:-1]) / 2.0, knots[:-1], knots[:-1])  # the second derivative is not continuous
-        mean = [even(at + cycle / 2.0, k) - even(at - cycle / 2.0, k) for k, at in zip((2, 1, 0), places, strict=True)]
+        even = make_interp_spline(
+            [far[0], *times, far[1]], [factors[0], *factors, factors[-1]], k=1
+        ).antiderivative()
+        knots = np.unique(
+            [far[0] + cycle, *(times - cycle / 2.0), *(times + cycle / 2.0), far[1] - cycle]
+        )
+        places = (
+            (knots[1:] + knots[:-1]) / 2.0,
+            knots[:-1],
+            knots[:-1],
+        )  # the second derivative is not continuous
+        mean = [
+            even(at + cycle / 2.0, k) - even(at - cycle / 2.0, k)
+            for k, at in zip((2, 1, 0), places, strict=True)
+        ]
         return PPoly(np.stack(mean) / [[2.0 * cycle], [cycle], [cycle]], knots)
 
     def shaking(self, time: FloatArray) -> FloatArray:
@@ -352,11 +394,15 @@ class Excitation:
             f"record.{axis}.txt": course_text(record.course.x, record.course.c[..., place], record.repeats)
             for axis, place in record.axes.items()
         }  # fmt: skip
-        return files | ({"ramp.txt": course_text(self.factor.x, self.factor.c)} if self.ramp else {})
+        return files | (
+            {"ramp.txt": course_text(self.factor.x, self.factor.c)} if self.ramp else {}
+        )
 
     def described(self) -> str:
         """The drive in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""
-        ramp = f", ramp {' to '.join(f'{factor:g}' for _, factor in self.ramp)}" if self.ramp else ""
+        ramp = (
+            f", ramp {' to '.join(f'{factor:g}' for _, factor in self.ramp)}" if self.ramp else ""
+        )
         if self.record:
             largest, line = self.record.largest(2), self.record.amplitude_range[1]
             of_line = f" (its line: {line:.4g} m/s²)" if line < _LINE_ALONE * largest else ""
@@ -392,9 +438,14 @@ def check_drive(drive: Excitation) -> None:
     largest = units.ACCELERATION.largest
     if drive.ramp and drive.peak_acceleration > largest:
         strongest = f"the largest one gives {drive.peak_acceleration:.6g} m/s²"
-        raise unusable("drive.ramp", f"expected factors that give accelerations up to {largest:g} m/s²; {strongest}")
+        raise unusable(
+            "drive.ramp",
+            f"expected factors that give accelerations up to {largest:g} m/s²; {strongest}",
+        )
     if drive.ramp and record and not record.is_stationary:
-        low, high = (amplitude / units.ACCELERATION_OF_ONE_G for amplitude in record.amplitude_range)
+        low, high = (
+            amplitude / units.ACCELERATION_OF_ONE_G for amplitude in record.amplitude_range
+        )
         changes = f"the amplitude of drive.record changes by itself, from {low:.3g} to {high:.3g} g"
         raise unusable("drive.ramp", f"expected none: {changes}")
 
@@ -404,7 +455,9 @@ def _check_record(record: Record) -> None:
     highest = units.FREQUENCY.largest
     if record.frequencies[1] > highest:
         actual = f"found {record.frequencies[1]:.4g} Hz: is the unit of the time right?"
-        raise unusable("drive.record", f"expected frequencies up to {highest:g} Hz; {actual}", record.file)
+        raise unusable(
+            "drive.record", f"expected frequencies up to {highest:g} Hz; {actual}", record.file
+        )
     periods = record.strongest_line * record.length
     if not record.repeats and periods < FEWEST_PERIODS:
         least = f"expected at least {FEWEST_PERIODS:g} periods of its strongest line, found {periods:.2g}"
@@ -418,15 +471,24 @@ def common_frequency(frequencies: list[float]) -> float:
     first = frequencies[0]
     if len(frequencies) == 1:  # asked for at every turn of a sweep's plan
         return first
-    ratios = [Fraction(frequency / first).limit_denominator(LARGEST_RATIO) for frequency in frequencies]
+    ratios = [
+        Fraction(frequency / first).limit_denominator(LARGEST_RATIO) for frequency in frequencies
+    ]
     for frequency, ratio in zip(frequencies, ratios, strict=True):
-        if not isclose(float(ratio) * first, frequency, rel_tol=1e-9) or ratio.numerator > LARGEST_RATIO:
-            raise ValueError(f"{frequency:g} Hz / {first:g} Hz is not a ratio of whole numbers up to {LARGEST_RATIO}")
+        if (
+            not isclose(float(ratio) * first, frequency, rel_tol=1e-9)
+            or ratio.numerator > LARGEST_RATIO
+        ):
+            raise ValueError(
+                f"{frequency:g} Hz / {first:g} Hz is not a ratio of whole numbers up to {LARGEST_RATIO}"
+            )
     below = lcm(*(ratio.denominator for ratio in ratios))
     numerators = [int(ratio * below) for ratio in ratios]
     common = gcd(*numerators)
     if max(numerators) > MOST_PERIODS * common:
-        raise ValueError(f"their common period is longer than {MOST_PERIODS} times the shortest period")
+        raise ValueError(
+            f"their common period is longer than {MOST_PERIODS} times the shortest period"
+        )
     return first * common / below
 
 

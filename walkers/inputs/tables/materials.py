@@ -19,7 +19,9 @@ _SOFTENED = Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFE
 class Beads(Table):
     """``[beads]``: the material of all beads."""
 
-    material: Indirect[str] = key("Material of all beads, from the library, which gives the density.", None, "ruby")
+    material: Indirect[str] = key(
+        "Material of all beads, from the library, which gives the density.", None, "ruby"
+    )
     density: units.Density = key("Density of the beads.")
 
 
@@ -30,25 +32,42 @@ class LiquidTable(Table):
         Choice(("dynamic_viscosity",), ("kinematic_viscosity",), instead="a liquid of the library"),
         Choice(("volume_fraction",), ("meniscus_radius",)),
     )
-    name: Indirect[str] = key("Liquid from the library. The other keys override its values.", None, "Si AK5")
-    mass_fraction: Indirect[Number] = key("Mass fraction of glycerol in `water-glycerol`.", None, 0.87, ge=0, le=1)
-    temperature: Indirect[units.Temperature] = key("Temperature of `water-glycerol`. Default: 20 °C.", None)
+    name: Indirect[str] = key(
+        "Liquid from the library. The other keys override its values.", None, "Si AK5"
+    )
+    mass_fraction: Indirect[Number] = key(
+        "Mass fraction of glycerol in `water-glycerol`.", None, 0.87, ge=0, le=1
+    )
+    temperature: Indirect[units.Temperature] = key(
+        "Temperature of `water-glycerol`. Default: 20 °C.", None
+    )
     surface_tension: units.SurfaceTension = key("Surface tension.")
     density: Indirect[units.Density] = key("Density of the liquid.", None)
     kinematic_viscosity: Indirect[units.KinematicViscosity] = key("Kinematic viscosity.", None)
-    dynamic_viscosity: units.DynamicViscosity | None = key("Dynamic viscosity, instead of the kinematic one.", None)
+    dynamic_viscosity: units.DynamicViscosity | None = key(
+        "Dynamic viscosity, instead of the kinematic one.", None
+    )
     volume_fraction: Number | None = key(
-        "Ratio of the volumes of liquid and bead. The bridges share the liquid.", None, 0.01, ge=1e-9, le=0.5
+        "Ratio of the volumes of liquid and bead. The bridges share the liquid.",
+        None,
+        0.01,
+        ge=1e-9,
+        le=0.5,
     )
     meniscus_radius: units.Length | None = key(
-        "Radius of the menisci of all bridges, which exchange liquid through the film on a wetted plate.", None, "70 um"
+        "Radius of the menisci of all bridges, which exchange liquid through the film on a wetted plate.",
+        None,
+        "70 um",
     )
-    viscosity_ratio: Number = key("Factor of the viscosity of the bridges. It scales their drag.", 1.0, ge=0, le=1e4)
+    viscosity_ratio: Number = key(
+        "Factor of the viscosity of the bridges. It scales their drag.", 1.0, ge=0, le=1e4
+    )
     contact_angle: units.UpToRightAngle = key(
         "Contact angle at every bridge. A case whose bridges push the beads of a walker apart at rest is refused."
     )
     conserved: units.Flag = key(
-        "Whether bridges take their liquid from the films of their beads, and give it back. For piles.", False
+        "Whether bridges take their liquid from the films of their beads, and give it back. For piles.",
+        False,
     )
     law: str = key("Law of the bridges. See [](../../how-to/bridge-law.md).", DEFAULT_LAW)
 
@@ -76,14 +95,20 @@ class Friction(Table):
     """``[contact.friction]``: Coulomb coefficients."""
 
     bead_bead: Coefficient = key("Coulomb coefficient between two beads.", example=0.25)
-    bead_wall: Coefficient = key("Coulomb coefficient between a bead and the boundary.", example=0.25)
+    bead_wall: Coefficient = key(
+        "Coulomb coefficient between a bead and the boundary.", example=0.25
+    )
 
 
 class Roughness(Table):
     """``[contact.roughness]``: gap that remains for the liquid between surfaces that touch at their asperities."""
 
-    bead_bead: units.Length = key("Roughness of a contact of two beads: the root of both squares.", example="30 nm")
-    bead_wall: units.Length = key("Roughness of a contact of a bead and the boundary.", example="30 nm")
+    bead_bead: units.Length = key(
+        "Roughness of a contact of two beads: the root of both squares.", example="30 nm"
+    )
+    bead_wall: units.Length = key(
+        "Roughness of a contact of a bead and the boundary.", example="30 nm"
+    )
 
 
 class ContactTable(Table):
@@ -95,10 +120,15 @@ class ContactTable(Table):
 
     friction: Friction = key("")
     roughness: Roughness = key("")
-    rolling_friction: Coefficient = key("Coefficient of rolling friction (constant directional torque).", example=0.01)
-    restitution: Number = key("Coefficient of restitution of the dry contact.", example=0.5, gt=0.05, le=1)
+    rolling_friction: Coefficient = key(
+        "Coefficient of rolling friction (constant directional torque).", example=0.01
+    )
+    restitution: Number = key(
+        "Coefficient of restitution of the dry contact.", example=0.5, gt=0.05, le=1
+    )
     youngs_modulus: Annotated[_SOFTENED | None, units.AUTO] = key(
-        "Young's modulus of beads and boundary: lower than the real one, so that the time step can be longer.", None
+        "Young's modulus of beads and boundary: lower than the real one, so that the time step can be longer.",
+        None,
     )
     poissons_ratio: Number = key("Poisson's ratio.", 0.3, ge=0, lt=0.5)
 
@@ -112,4 +142,6 @@ class Contact(ContactTable):
 class Environment(Table):
     """``[environment]``."""
 
-    gravity: Annotated[float, replace(units.ACCELERATION, example="9.81 m/s^2")] = key("Acceleration of gravity.", 9.81)
+    gravity: Annotated[float, replace(units.ACCELERATION, example="9.81 m/s^2")] = key(
+        "Acceleration of gravity.", 9.81
+    )

@@ -42,14 +42,23 @@ class RunTable(Table):
         Choice(("samples_per_cycle",), ("frames_per_second",), required=False),
     )
     time_step: Annotated[units.Time | None, AUTO] = key(
-        "Time step, or its upper limit: the program fits a whole number of samples into a cycle.", None
+        "Time step, or its upper limit: the program fits a whole number of samples into a cycle.",
+        None,
     )
-    allow_unstable: Annotated[units.Flag, SAME_RUN] = key("Accept a time step beyond a stability limit.", False)
+    allow_unstable: Annotated[units.Flag, SAME_RUN] = key(
+        "Accept a time step beyond a stability limit.", False
+    )
     cycles: Annotated[_Cycles | None, AUTO] = key(
-        "Number of drive cycles. `auto`: until velocities are constant. See [](../cases.md#length-of-a-run).", None, 60
+        "Number of drive cycles. `auto`: until velocities are constant. See [](../cases.md#length-of-a-run).",
+        None,
+        60,
     )
-    most_cycles: Indirect[_Cycles] = key('Upper limit for `cycles = "auto"`. Default: 60.', None, 60)
-    duration: Indirect[Duration] = key("Duration of the drive, instead of `cycles`. Loose beads need it.", None)
+    most_cycles: Indirect[_Cycles] = key(
+        'Upper limit for `cycles = "auto"`. Default: 60.', None, 60
+    )
+    duration: Indirect[Duration] = key(
+        "Duration of the drive, instead of `cycles`. Loose beads need it.", None
+    )
     until: Annotated[Literal["climb"] | None, AUTO] = key(
         'Event that ends the run of a pile before its `duration`: `"climb"`, the first climb. '
         "The run ends with the segment in which the climb qualifies.",
@@ -57,17 +66,30 @@ class RunTable(Table):
         "climb",
     )
     settling_cycles: Whole | None = key(
-        "Cycles at the start, which are not measured. Default: a third, at most 20.", None, 20, ge=0, le=1_000_000
+        "Cycles at the start, which are not measured. Default: a third, at most 20.",
+        None,
+        20,
+        ge=0,
+        le=1_000_000,
     )
-    samples_per_cycle: _Samples | None = key("Samples of the beads per cycle. Default: 20.", None, 20)
+    samples_per_cycle: _Samples | None = key(
+        "Samples of the beads per cycle. Default: 20.", None, 20
+    )
     bridge_samples_per_cycle: Indirect[_Samples] = key(
-        "Samples of the bridges per cycle, a divisor of `samples_per_cycle`. Default: 1; loose beads: all.", None, 1
+        "Samples of the bridges per cycle, a divisor of `samples_per_cycle`. Default: 1; loose beads: all.",
+        None,
+        1,
     )
     frames_per_second: Indirect[Number] = key(
-        "Samples per second, instead of per cycle. Default for loose beads: 60.", None, 60, gt=0, le=1e6
+        "Samples per second, instead of per cycle. Default for loose beads: 60.",
+        None,
+        60,
+        gt=0,
+        le=1e6,
     )
     segment: Indirect[Duration] = key(
-        "Length of a segment; a run can continue after a complete segment. Default for loose beads: 0.5 s.", None
+        "Length of a segment; a run can continue after a complete segment. Default for loose beads: 0.5 s.",
+        None,
     )
     settled_below: units.Speed | None = key(
         "Root mean square velocity of a settled pile. Default for loose beads: 5 mm/s.", None
@@ -75,8 +97,12 @@ class RunTable(Table):
     longest_settling: units.NonNegativeDuration | None = key(
         "Longest time for settling before the drive starts. Default for loose beads: 0.5 s.", None
     )
-    ranks: Whole = key("Number of MPI processes. Only large piles are faster with several.", 1, ge=1, le=64)
-    seed: Whole = key("Seed of the random perturbations and of poured beads.", 1, ge=0, le=2**63 - 1)
+    ranks: Whole = key(
+        "Number of MPI processes. Only large piles are faster with several.", 1, ge=1, le=64
+    )
+    seed: Whole = key(
+        "Seed of the random perturbations and of poured beads.", 1, ge=0, le=2**63 - 1
+    )
 
 
 class Run(RunTable):

@@ -25,7 +25,9 @@ from walkers.physics.capillary import derjaguin_radius, rupture_distance
 from walkers.physics.portable import cosine, sine
 
 
-def lambert(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
+def lambert(
+    radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray
+) -> FloatArray:
     """Pull without the second term, as corrected by Lambert et al. (2008): 2πRγ cos θ / (1 + h / 2d).
 
     d, half the immersed height, from the volume: 2d/h = -1 + √(1 + 2V / πRh²) (Rabinovich et al., Eq. 20).
@@ -37,7 +39,9 @@ def lambert(radius_1: float, radius_2: float, volume: float, contact_angle: floa
     return 2.0 * pi * radius * float(cosine(contact_angle)) / (1.0 + gaps / immersed)
 
 
-def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
+def pull(
+    radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray
+) -> FloatArray:
     """Rabinovich et al. (2005), Eq. 19: `lambert`, and 2πRγ sin α sin(θ + α) with α² = 2d/R (their Eq. A3)."""
     radius = derjaguin_radius(radius_1, radius_2)
     immersed = np.sqrt(gaps**2 + 2.0 * volume / (pi * radius)) - gaps
@@ -48,5 +52,10 @@ def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, 
 
 def law(surfaces: Surfaces) -> Curve:
     """Pull of Rabinovich et al. (Eq. 19), rupture distance of Lian et al., and Reynolds resistances."""
-    bridge = (surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle)
+    bridge = (
+        surfaces.radius,
+        surfaces.other_radius,
+        surfaces.volume,
+        surfaces.liquid.contact_angle,
+    )
     return reynolds.curve(surfaces, lambda gaps: pull(*bridge, gaps), rupture_distance(*bridge[2:]))

@@ -58,7 +58,9 @@ def _by_volume_and_angle(
     return value
 
 
-def pull(radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray) -> FloatArray:
+def pull(
+    radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray
+) -> FloatArray:
     """Willett et al. (2000), appendix: ln(F / 2πRγ) = f1 - f2 exp(f3 ln s + f4 ln² s), s half the gap over √(V/R).
 
     Parameters and result as for `walkers.physics.laws.soulie.pull`.
@@ -80,5 +82,10 @@ def rupture(radius_1: float, radius_2: float, volume: float, contact_angle: floa
 
 def law(surfaces: Surfaces) -> Curve:
     """Pull (appendix) and rupture distance (Eq. 15) of Willett et al., and Reynolds resistances."""
-    bridge = (surfaces.radius, surfaces.other_radius, surfaces.volume, surfaces.liquid.contact_angle)
+    bridge = (
+        surfaces.radius,
+        surfaces.other_radius,
+        surfaces.volume,
+        surfaces.liquid.contact_angle,
+    )
     return reynolds.curve(surfaces, lambda gaps: pull(*bridge, gaps), rupture(*bridge))

@@ -50,7 +50,9 @@ def law(surfaces: Surfaces) -> Curve:
 
 def unsolved(bridges: Iterable[Surfaces]) -> int:
     """Number of bridge shapes without a cached solution; each takes a tenth of a second."""
-    return sum(not is_trusted(_place(shape)) for shape in {_shape(surfaces) for surfaces in bridges})
+    return sum(
+        not is_trusted(_place(shape)) for shape in {_shape(surfaces) for surfaces in bridges}
+    )
 
 
 def _shape(surfaces: Surfaces) -> _Shape:

@@ -18,10 +18,17 @@ def caption(case: Case) -> str:
     >>> caption(load_case("fig4a"))
     '6 walkers of R = 0.6 / 0.3 mm on a plane of glass, Si AK5; 80 Hz, a0 = 19.6 m/s²'
     """
-    bodies = [f"{counted(make.replicates, 'walker')} of R = {radii_text(make.radii)} mm" for make in case.walkers]
+    bodies = [
+        f"{counted(make.replicates, 'walker')} of R = {radii_text(make.radii)} mm"
+        for make in case.walkers
+    ]
     if case.loose:
-        bodies.append(f"{case.count - sum(len(make.all_radii) for make in case.walkers)} loose beads")
-    boundary = f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"
+        bodies.append(
+            f"{case.count - sum(len(make.all_radii) for make in case.walkers)} loose beads"
+        )
+    boundary = (
+        f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"
+    )
     return f"{', '.join(bodies)} {boundary} of {case.boundary.material}, {liquid_text(case)}; {conditions(case)}"
 
 
@@ -32,7 +39,11 @@ def conditions(case: Case) -> str:
     """
     parts = [case.excitation.described()]
     if case.boundary.tilted:
-        up = "right is up" if case.goes_uphill else f"up is at {degrees(case.boundary.uphill):.4g}° from x toward y"
+        up = (
+            "right is up"
+            if case.goes_uphill
+            else f"up is at {degrees(case.boundary.uphill):.4g}° from x toward y"
+        )
         parts += [case.boundary.tilted, up]
     return ", ".join(parts)
 

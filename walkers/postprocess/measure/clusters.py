@@ -72,7 +72,9 @@ def connected(count: int, pairs: IntArray) -> IntArray:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    graph = coo_array(
+        (np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])), shape=(count, count)
+    )
     labels: IntArray = connected_components(graph, directed=False)[1].astype(np.int64)
     return labels
 
@@ -82,7 +84,9 @@ def floor_of(wall_names: Sequence[str]) -> int:
     return FLOOR if wall_names[FLOOR] == FLOOR_NAME else NO_FLOOR
 
 
-def bulk_of(labels: IntArray, bridges: Bridges, *, heap: bool = True, floor: int = FLOOR) -> BoolArray:
+def bulk_of(
+    labels: IntArray, bridges: Bridges, *, heap: bool = True, floor: int = FLOOR
+) -> BoolArray:
     """Whether beads are part of the bulk, shape (N,).
 
     Without a ``heap`` (placed beads) the largest component may be a cluster on a wall, and does not count.
@@ -99,7 +103,9 @@ def at_sides(bridges: Bridges, count: int, floor: int = FLOOR) -> BoolArray:
     return np.isin(np.arange(count), beads[walls != floor])
 
 
-def held_clusters(labels: IntArray, bridges: Bridges, bulk: BoolArray, floor: int = FLOOR) -> Iterator[Cluster]:
+def held_clusters(
+    labels: IntArray, bridges: Bridges, bulk: BoolArray, floor: int = FLOOR
+) -> Iterator[Cluster]:
     """The clusters that are free and held in a frame."""
     beads, walls = bridges.at_walls[:, bridges.at_walls[1] != floor]
     for label in np.unique(labels[beads[~bulk[beads]]]):
@@ -113,7 +119,9 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]]) -> list[Trac
     tracks: list[Track] = []
     alive: list[int] = []
     for frame, present in enumerate(clusters):
-        alive = [number for number in alive if time[frame] - time[tracks[number].frames[-1]] <= MAX_GAP]
+        alive = [
+            number for number in alive if time[frame] - time[tracks[number].frames[-1]] <= MAX_GAP
+        ]
         # The larger overlap first: of two tracks that merge, the one with more beads continues.
         shared = []
         for number in alive:
@@ -201,7 +209,9 @@ def climbs_of(tracks: Sequence[Track], beads: Beads) -> Columns:
     on later frames: up to a given time, records of any length contain the same climbs.
     """
     rows = [_climb_of(number, track, beads) for number, track in enumerate(tracks)]
-    return {name: np.array([row[name] for row in rows], dtype=kind) for name, kind in _KINDS.items()}
+    return {
+        name: np.array([row[name] for row in rows], dtype=kind) for name, kind in _KINDS.items()
+    }
 
 
 _KINDS = {
@@ -227,7 +237,9 @@ def _climb_of(number: int, track: Track, beads: Beads) -> dict[str, Any]:
     first = int(_starts_of_rises(gained)[top])
     last = _end_of_rise(gained, first, top)
     rise, end = slice(first, last + 1), frames[last]
-    onset, qualified = beads.time[frames[moments]] if (moments := _qualified(gained)) else (np.nan, np.nan)
+    onset, qualified = (
+        beads.time[frames[moments]] if (moments := _qualified(gained)) else (np.nan, np.nan)
+    )
     speed, error = _speed(seconds[rise], gained[rise])
     topmost = (
         max(members, key=lambda bead: height[frame, bead])
@@ -317,7 +329,9 @@ def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
     if timed.sum() < _FEWEST_BLOCKS:
         return speed, np.nan
     speeds, shares = risen[timed] / lasted[timed], lasted[timed] / lasted[timed].sum()
-    return speed, float(np.sqrt((shares**2 * (speeds - speed) ** 2).sum() * timed.sum() / (timed.sum() - 1)))
+    return speed, float(
+        np.sqrt((shares**2 * (speeds - speed) ** 2).sum() * timed.sum() / (timed.sum() - 1))
+    )
 
 
 def members_of(tracks: Sequence[Track], beads: Beads) -> Columns:
@@ -341,10 +355,16 @@ def members_of(tracks: Sequence[Track], beads: Beads) -> Columns:
 def _of_beads(columns: Columns, beads: Beads) -> Columns:
     """Columns with the time of their frames, and class and height of their beads."""
     frame, bead = columns.pop("frame"), columns["bead"]
-    return columns | {"time": beads.time[frame], "large": beads.large[bead], "height": beads.height[frame, bead]}
+    return columns | {
+        "time": beads.time[frame],
+        "large": beads.large[bead],
+        "height": beads.height[frame, bead],
+    }
 
 
-def assembly_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges: Iterable[Bridges]) -> Columns:
+def assembly_of(
+    tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges: Iterable[Bridges]
+) -> Columns:
     """Table ``assembly``: state of the beads of each climb in each frame, from rest until it qualifies.
 
     Of the ``bridges`` of all frames those after the last of these are not asked for.
@@ -358,15 +378,27 @@ def assembly_of(tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges:
     rows: list[list[tuple[Any, ...]]] = [[] for _ in climbing]
     for now in takewhile(lambda now: now.frame <= max(ends), bridges if ends else ()):
         walled = at_sides(now, len(beads.large), floor_of(beads.wall_names))
-        for number, until, members, of_climb in zip(climbing, ends, members_of_climbs, rows, strict=True):
+        for number, until, members, of_climb in zip(
+            climbing, ends, members_of_climbs, rows, strict=True
+        ):
             if not max(beads.first - 1, 0) <= now.frame <= until:
                 continue
             within = np.searchsorted(members, now.beads[np.isin(now.beads, members).all(axis=1)])
-            labels, neighbours = connected(len(members), within), np.bincount(within.ravel(), minlength=len(members))
+            labels, neighbours = (
+                connected(len(members), within),
+                np.bincount(within.ravel(), minlength=len(members)),
+            )
             joined = (labels == np.bincount(labels).argmax()) & (neighbours > 0)
             states = (members, beads.bulk[now.frame][members], walled[members], neighbours, joined)
             of_climb += [(now.frame, number, *state) for state in zip(*states, strict=True)]
-    kinds = {"frame": int, "track": int, "bead": int, "in_bulk": bool, "at_wall": bool, "neighbours": int}
+    kinds = {
+        "frame": int,
+        "track": int,
+        "bead": int,
+        "in_bulk": bool,
+        "at_wall": bool,
+        "neighbours": int,
+    }
     return _of_beads(columns_of(chain.from_iterable(rows), **kinds, joined=bool), beads)
 
 
@@ -388,13 +420,18 @@ def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads) -> Columns
             rows.append((track.merged_at, number, track.merged_into, "merged"))
         elif time[-1] - time[last] > MAX_GAP:
             # It rejoined the pile if most of its beads were in the bulk before the track ended.
-            until = min(int(np.searchsorted(time, time[last] + MAX_GAP, side="right")), len(time) - 1)
+            until = min(
+                int(np.searchsorted(time, time[last] + MAX_GAP, side="right")), len(time) - 1
+            )
             members, after = list(track.members[-1]), beads.bulk[last + 1 : until + 1]
             back = any(bulk[members].mean() >= MIN_OVERLAP for bulk in after)
             rows.append((last + 1, number, -1, "rejoined" if back else "detached"))
     events = columns_of(sorted(rows), frame=int, track=int, other=int, event=str)
     frame = events.pop("frame")
-    return events | {"time": time[frame], "height": beads.height[frame, climbs["leader"][events["track"]]]}
+    return events | {
+        "time": time[frame],
+        "height": beads.height[frame, climbs["leader"][events["track"]]],
+    }
 
 
 def _parent(tracks: Sequence[Track], number: int, time: FloatArray) -> int:

@@ -89,8 +89,13 @@ class BinaryDump:
 
     def frame(self, number: int) -> FloatArray:
         """Values of a frame, shape (rows, columns); `NoNumberError` if one of them is not a number."""
-        parts = [np.frombuffer(self._bytes, float, count, start) for start, count in self._frames[number].parts]
-        values = (parts[0] if len(parts) == 1 else np.concatenate(parts)).reshape(-1, len(self.columns))
+        parts = [
+            np.frombuffer(self._bytes, float, count, start)
+            for start, count in self._frames[number].parts
+        ]
+        values = (parts[0] if len(parts) == 1 else np.concatenate(parts)).reshape(
+            -1, len(self.columns)
+        )
         is_finite = np.isfinite(values)
         if not is_finite.all():
             _, columns = np.nonzero(~is_finite)
@@ -138,19 +143,31 @@ def local_frames(path: Path, columns: tuple[str, ...]) -> Iterator[tuple[int, Fl
             try:
                 values = np.fromstring(b"".join(body), dtype=np.float64, sep=" ")
             except ValueError as error:
-                raise DumpError(f"{path}: not a number in the frame of step {step} ({error})") from error
+                raise DumpError(
+                    f"{path}: not a number in the frame of step {step} ({error})"
+                ) from error
             if len(values) != count * len(columns):
-                raise DumpError(f"{path}: expected {len(columns)} columns in the frame of step {step}")
+                raise DumpError(
+                    f"{path}: expected {len(columns)} columns in the frame of step {step}"
+                )
             if not np.isfinite(values).all():
                 raise DumpError(f"{path}: a NaN or an infinity in the frame of step {step}")
             yield step, values.reshape(count, len(columns))
 
 
-def write_local_dump(path: Path, columns: tuple[str, ...], frames: Iterable[tuple[int, FloatArray]]) -> None:
+def write_local_dump(
+    path: Path, columns: tuple[str, ...], frames: Iterable[tuple[int, FloatArray]]
+) -> None:
     """Write a local dump as the engine does, with twelve digits; the bounds of the box are zero."""
     lines = []
     for step, rows in frames:
-        lines += ["ITEM: TIMESTEP", str(step), "ITEM: NUMBER OF ENTRIES", str(len(rows)), "ITEM: BOX BOUNDS ff ff ff"]
+        lines += [
+            "ITEM: TIMESTEP",
+            str(step),
+            "ITEM: NUMBER OF ENTRIES",
+            str(len(rows)),
+            "ITEM: BOX BOUNDS ff ff ff",
+        ]
         lines += ["0 0"] * 3 + [f"ITEM: ENTRIES {' '.join(columns)}"]
         lines += [" ".join([f"{value:.12g}" for value in row]) + " " for row in rows.tolist()]
     path.write_text("\n".join(lines) + "\n", "ascii")

@@ -117,11 +117,20 @@ def averages(group: Group) -> Averages:
     looks = chain([group], (replace(group, position=between(group, share)) for share in shares))
     for part, (before, after) in enumerate(pairwise(looks)):
         opened.append((before.gap[samples] > 0.0).mean(axis=0))
-        for direction, course in group.case.excitation.motions(begin + (part + 0.5) / parts * interval):
-            pull, displacement = -course[-1], after.mass_centre - before.mass_centre[: len(interval)]
+        for direction, course in group.case.excitation.motions(
+            begin + (part + 0.5) / parts * interval
+        ):
+            pull, displacement = (
+                -course[-1],
+                after.mass_centre - before.mass_centre[: len(interval)],
+            )
             work += pull[:, None] * (displacement @ np.array(direction))
     cycles = len(work) // run.samples_per_cycle
-    of_cycles = work[: cycles * run.samples_per_cycle].reshape(cycles, run.samples_per_cycle, -1).sum(axis=1)
+    of_cycles = (
+        work[: cycles * run.samples_per_cycle]
+        .reshape(cycles, run.samples_per_cycle, -1)
+        .sum(axis=1)
+    )
     mean = gait(group.motion.averaged.group(group.walkers[0].make))
     return Averages(
         rotation=mean.rotation[samples].mean(axis=0),
@@ -144,7 +153,9 @@ def distance_walked(group: Group) -> tuple[FloatArray, FloatArray]:
     strobe = group.case.run.samples_per_cycle
     centre, heading = group.mass_centre[::strobe], group.heading[::strobe]
     steps = np.einsum("fwx,fwx->fw", np.diff(centre, axis=0), (heading[1:] + heading[:-1]) / 2.0)
-    return group.time[::strobe], np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+    return group.time[::strobe], np.concatenate(
+        [np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)]
+    )
 
 
 def walk(group: Group) -> Columns:
@@ -156,7 +167,9 @@ def walk(group: Group) -> Columns:
     settled = group.case.run.settled_strobes
     time, distance = distance_walked(group)
     if len(time) < settled + 2:
-        raise DumpError(f"the dump holds {len(time) - 1} cycles, no more than the {settled} settling ones")
+        raise DumpError(
+            f"the dump holds {len(time) - 1} cycles, no more than the {settled} settling ones"
+        )
     time, distance = time[settled:], distance[settled:]
     velocity = first = second = fit_slopes(time, distance)
     middle = (len(time) + 1) // 2
@@ -170,7 +183,8 @@ def walk(group: Group) -> Columns:
         "second_half": second,
         "axial_velocity": fit_slopes(time, centre @ group.drive_axis),
         "lateral_velocity": fit_slopes(time, centre @ group.across_axis),
-        "steady": np.abs(first - second) <= np.maximum(STEADY_DIFFERENCE * np.abs(velocity), STEADY_SPEED),
+        "steady": np.abs(first - second)
+        <= np.maximum(STEADY_DIFFERENCE * np.abs(velocity), STEADY_SPEED),
     }
 
 
@@ -262,7 +276,9 @@ def are_constant(directory: Path) -> bool:
 
 def _is_constant(group: Group) -> bool:
     walked, run = walk(group), group.case.run
-    turned = np.abs(np.diff(group.orientation[:: run.samples_per_cycle][run.settled_strobes :], axis=0))
+    turned = np.abs(
+        np.diff(group.orientation[:: run.samples_per_cycle][run.settled_strobes :], axis=0)
+    )
     before, after = turned[: len(turned) // 2].max(axis=0), turned[len(turned) // 2 :].max(axis=0)
     little = (after < _LITTLE) & (after < before + _NO_FASTER)
     allowed = max(CONSTANT * float(np.abs(walked["velocity"]).max()), REST)

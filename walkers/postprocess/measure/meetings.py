@@ -40,7 +40,11 @@ def derived(case: Case) -> dict[str, float]:
     """Coverage, rounded to three digits so that equal trays form one group in figures."""
     boundary, spacing = case.boundary, max(make.spacing for make in case.walkers)
     cell = spacing * (boundary.width or spacing)
-    floor = boundary.geometry.cross_section if boundary.closed else cell * sum(make.replicates for make in case.walkers)
+    floor = (
+        boundary.geometry.cross_section
+        if boundary.closed
+        else cell * sum(make.replicates for make in case.walkers)
+    )
     return {"coverage": float(f"{pi * sum(radius**2 for radius in case.all_radii) / floor:.3g}")}
 
 
@@ -53,7 +57,9 @@ def measure(motion: Motion) -> Measured:
     rows: list[tuple[int, str, int, int, int]] = []
     for number, (before, now) in enumerate(pairwise((frozenset(), *joined))):
         for event, pairs in (("merged", now - before), ("parted", before - now)):
-            rows += [(frames[number], event, *pair, size[number, pair[0]]) for pair in sorted(pairs)]
+            rows += [
+                (frames[number], event, *pair, size[number, pair[0]]) for pair in sorted(pairs)
+            ]
     table = columns_of(rows, frame=int, event=str, walker=int, other=int, size=int)
     frame, walker, partner = table.pop("frame"), table["walker"], table["other"]
     cosine = (heading[frame, walker] * heading[frame, partner]).sum(axis=-1)
@@ -69,7 +75,9 @@ def measure(motion: Motion) -> Measured:
     return Measured({"meetings": table}, numbers)
 
 
-def _state_of(motion: Motion, bridges: Bridges) -> tuple[frozenset[tuple[int, ...]], IntArray, BoolArray]:
+def _state_of(
+    motion: Motion, bridges: Bridges
+) -> tuple[frozenset[tuple[int, ...]], IntArray, BoolArray]:
     """Pairs of walkers that bridges join in a frame; size of the cluster of each walker, and whether it is held."""
     owners = np.sort(motion.walker_of[bridges.beads], axis=1)
     between = owners[(owners[:, 0] >= 0) & (owners[:, 0] != owners[:, 1])]

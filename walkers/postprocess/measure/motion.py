@@ -96,9 +96,13 @@ class Motion:
         """The motion during the drive."""
         return self.select(slice(self.first_driven, None)) if self.first_driven else self
 
-    def select(self, frames: slice = slice(None), beads: IntArray | None = None, **changes: Any) -> Motion:
+    def select(
+        self, frames: slice = slice(None), beads: IntArray | None = None, **changes: Any
+    ) -> Motion:
         """The motion of selected frames and beads, with changes; beads are renumbered, walkers are not."""
-        parts = {name: part[frames] for name in _OF_FRAMES if (part := getattr(self, name)) is not None} | changes
+        parts = {
+            name: part[frames] for name in _OF_FRAMES if (part := getattr(self, name)) is not None
+        } | changes
         if beads is None:
             return replace(self, **parts)
         parts |= {name: part[:, beads] for name, part in parts.items() if name in _OF_BEADS}
@@ -122,7 +126,9 @@ class Motion:
         Velocities are displacements over time, the average over all steps. Spins are those that the engine averaged, if
         any, otherwise the mean of both ends.
         """
-        spin = (self.spin[1:] + self.spin[:-1]) / 2.0 if self.mean_spin is None else self.mean_spin[1:]
+        spin = (
+            (self.spin[1:] + self.spin[:-1]) / 2.0 if self.mean_spin is None else self.mean_spin[1:]
+        )
         position = (self.position[1:] + self.position[:-1]) / 2.0
         velocity = np.diff(self.position, axis=0) / np.diff(self.time)[:, None, None]
         return self.select(slice(1, None), position=position, velocity=velocity, spin=spin)
@@ -214,7 +220,11 @@ class Group:
     def gap(self) -> FloatArray:
         """Gaps of beads to their nearest walls, then of pairs, m, negative for overlap, shape (F, W, n + pairs)."""
         position, boundary = self.position, self.case.boundary
-        heights = [position[..., 2]] if boundary.bare else [wall.distances(position) for wall in boundary.walls]
+        heights = (
+            [position[..., 2]]
+            if boundary.bare
+            else [wall.distances(position) for wall in boundary.walls]
+        )
         gaps = [reduce(np.minimum, heights) - self.radii]
         for first, second in self.make.pairs:
             distance = np.linalg.norm(position[:, :, first] - position[:, :, second], axis=-1)
@@ -281,7 +291,11 @@ def read_motion(directory: str | Path) -> Motion:
         return _joined(case, paths)
     except NoNumberError as error:
         finished = (directory / MANIFEST_NAME).is_file()  # then its dumps contained no such numbers
-        message = "the dump was damaged after the run was finished" if finished else "the simulation blew up"
+        message = (
+            "the dump was damaged after the run was finished"
+            if finished
+            else "the simulation blew up"
+        )
         raise DumpError(f"{error}: {message}") from error
 
 
@@ -385,7 +399,8 @@ def _joined(case: Case, paths: Sequence[Path]) -> Motion:
         substrate=visible_displacement(case.excitation, time),
         radius=parts[0].dump.frame(0)[:, parts[0].layout.bead_columns.index("radius")].copy(),
         walkers=tuple(
-            replace(walker, beads=tuple(bead - 1 for bead in walker.beads)) for walker in last.layout.walkers
+            replace(walker, beads=tuple(bead - 1 for bead in walker.beads))
+            for walker in last.layout.walkers
         ),
         frames=[(part.path, number) for part in parts for number in part.frames],
         truncated=last.dump.truncated,
@@ -397,7 +412,9 @@ def _joined(case: Case, paths: Sequence[Path]) -> Motion:
 def prescribed_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Displacement and velocity of the walls in the frame of the drive, m and m/s, shape (F, 3)."""
     displacement, velocity = boundary_motion(drive, time)
-    return (displacement, velocity) if drive.frame == "lab" else (0.0 * displacement, 0.0 * velocity)
+    return (
+        (displacement, velocity) if drive.frame == "lab" else (0.0 * displacement, 0.0 * velocity)
+    )
 
 
 def boundary_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -454,7 +471,11 @@ def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Itera
     Raises a `DumpError` if a dump cannot be read or ends early, or if no frame recorded bridges.
     """
     stride = motion.case.run.samples_per_bridge_sample
-    frame_at = {place: frame for frame, place in enumerate(motion.frames) if frames is None or frame in frames}
+    frame_at = {
+        place: frame
+        for frame, place in enumerate(motion.frames)
+        if frames is None or frame in frames
+    }
     for segment in dict.fromkeys(segment for segment, _ in motion.frames):
         layout = layout_of(segment)
         pairs = local_frames(segment / layout.pair_bridge_dump, layout.pair_bridge_columns)
@@ -465,13 +486,21 @@ def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Itera
             if frame is not None:
                 yield _bridges(motion, frame, between, against, layout)
         if number + 1 != layout.bridge_frames:
-            raise DumpError(f"{segment}: its bridges hold {number + 1} of {layout.bridge_frames} frames")
+            raise DumpError(
+                f"{segment}: its bridges hold {number + 1} of {layout.bridge_frames} frames"
+            )
     if frames is None and len(frame_at) == len(motion.frames):
         raise DumpError(f"{motion.directory}: none of its frames recorded bridges")
 
 
-def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: Layout) -> Bridges:
-    place, pair, wall = motion.position[frame], layout.pair_bridge_columns.index, layout.wall_bridge_columns.index
+def _bridges(
+    motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: Layout
+) -> Bridges:
+    place, pair, wall = (
+        motion.position[frame],
+        layout.pair_bridge_columns.index,
+        layout.wall_bridge_columns.index,
+    )
     index = np.full(layout.atoms, -1)  # in the motion, which may hold some of the beads
     index[slice(None) if motion.numbers is None else motion.numbers] = np.arange(len(place))
     # The dumps also contain neighbours without a bridge; their force is zero.
@@ -482,7 +511,9 @@ def _bridges(motion: Motion, frame: int, between: FloatArray, against: FloatArra
     held, kept = np.all(ids >= 0, axis=1), beads >= 0
     between, against, ids, beads = between[held], against[kept], ids[held], beads[kept]
     arm = place[ids[:, 1]] - place[ids[:, 0]]
-    pull = np.einsum("kx,kx->k", between[:, pair("fx") : pair("fx") + 3], arm) / np.linalg.norm(arm, axis=1)
+    pull = np.einsum("kx,kx->k", between[:, pair("fx") : pair("fx") + 3], arm) / np.linalg.norm(
+        arm, axis=1
+    )
     walls = against[:, wall("wall")].astype(np.int64)
     normals = np.stack([surface.normals(place[beads]) for surface in motion.case.boundary.walls])
     normals = normals[walls, np.arange(len(walls))]

@@ -8,7 +8,15 @@ from fnmatch import fnmatchcase
 from math import isfinite, nan
 from typing import Any
 
-from walkers.postprocess.measure.quantities import LABELS, SHOWN, Quantity, declared, is_error, ordered, unit_shown
+from walkers.postprocess.measure.quantities import (
+    LABELS,
+    SHOWN,
+    Quantity,
+    declared,
+    is_error,
+    ordered,
+    unit_shown,
+)
 from walkers.postprocess.measure.sides import REST
 from walkers.postprocess.measure.tables import Columns
 from walkers.rounding import counted, rounded, with_decimals
@@ -67,13 +75,19 @@ def state(numbers: Mapping[str, Any]) -> str:
     if numbers.get("came_apart"):
         return "came apart"
     thresholds = {verb: numbers.get(f"{verb}_at", nan) for verb in ("stops", "starts")}
-    if texts := [f"{verb} at {' '.join(shown(peak, 'm/s^2'))}" for verb, peak in thresholds.items() if isfinite(peak)]:
+    if texts := [
+        f"{verb} at {' '.join(shown(peak, 'm/s^2'))}"
+        for verb, peak in thresholds.items()
+        if isfinite(peak)
+    ]:
         return ", ".join(texts)
     if "stops_at" in numbers:
         return "no threshold within the ramp"
     if isfinite(numbers.get("slow_share", nan)):
         count = numbers["walkers"]
-        slow, clustered = (round(count * numbers[name]) for name in ("slow_share", "clustered_share"))
+        slow, clustered = (
+            round(count * numbers[name]) for name in ("slow_share", "clustered_share")
+        )
         return f"{slow} of {count} walkers slow, {clustered} in clusters"
     return "at rest" if "velocity" in numbers and abs(numbers[headline(numbers)]) < REST else ""
 
@@ -103,7 +117,9 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
         hidden -= {"axial_velocity", "axial_left_facing"}
     if fell(numbers):
         hidden |= {"right_facing", "left_facing"}
-    if not (numbers.get("facing_right") and numbers.get("facing_left")):  # the velocity is that of the only direction
+    if not (
+        numbers.get("facing_right") and numbers.get("facing_left")
+    ):  # the velocity is that of the only direction
         hidden |= {"right_facing", "left_facing", "axial_left_facing"}
     if main != "velocity":
         hidden |= {"velocity"}
@@ -118,7 +134,9 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
         if number or not any(fnmatchcase(name, pattern) for pattern in SHOWN["if_any"]):
             quantity = declared(name)
             text, unit = shown(number, quantity.unit)
-            listed.append(Row(name, _label(quantity, numbers), text, unit, _errors(numbers, quantity)))
+            listed.append(
+                Row(name, _label(quantity, numbers), text, unit, _errors(numbers, quantity))
+            )
     return listed
 
 
@@ -155,7 +173,10 @@ def _errors(numbers: Mapping[str, Any], quantity: Quantity) -> str:
     """Scatter or resolution, band and numerical error of a number in its displayed unit; of an angle, its range."""
     parts = []
     if quantity.name == "orientation_end" and numbers["walkers"] > 1:
-        ends = (shown(numbers[f"orientation_{end}"], quantity.unit)[0] for end in ("smallest", "largest"))
+        ends = (
+            shown(numbers[f"orientation_{end}"], quantity.unit)[0]
+            for end in ("smallest", "largest")
+        )
         parts.append(f"walkers {' to '.join(ends)}")
     if isfinite(scatter := numbers.get(quantity.error, nan)):
         word = "resolution" if quantity.error.endswith("_within") else "scatter of copies"
@@ -178,7 +199,9 @@ def band_of(numbers: Mapping[str, Any], quantity: Quantity) -> str:
     low, high = (numbers.get(f"{quantity.name}_{end}") for end in ("low", "high"))
     if low is None or high is None:
         return ""
-    draws = draws_text(numbers[f"{quantity.name}_draws"], approximate=numbers[f"{quantity.name}_approximate"])
+    draws = draws_text(
+        numbers[f"{quantity.name}_draws"], approximate=numbers[f"{quantity.name}_approximate"]
+    )
     return f"band {band_text(low, high, quantity.unit)} ({draws})"
 
 

@@ -105,7 +105,10 @@ def _of_bed(motion: Motion, bed: Columns) -> dict[str, Any]:
     late = time >= min(time[motion.first_driven :].mean(), end)
     numbers = {"driven": float(max(end, 0.0)), "settling": float(min(end, 0.0) - time[0])}
     for name in ("surface", "brazil_nut"):
-        numbers |= {f"{name}_start": float(bed[name][motion.first_driven]), f"{name}_end": float(bed[name][-1])}
+        numbers |= {
+            f"{name}_start": float(bed[name][motion.first_driven]),
+            f"{name}_end": float(bed[name][-1]),
+        }
     for name in ("contacts", "bridges"):
         numbers[f"{name}_at_rest"] = float(bed[name][rest])
         numbers[f"{name}_shaken"] = float(np.mean(bed[name][late])) if end > 0.0 else nan
@@ -120,18 +123,26 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
     frame = np.searchsorted(motion.time, members["time"]).clip(max=len(motion.time) - 1)
     in_motion = motion.time[frame] == members["time"]  # a motion need not have all frames
     track[frame[in_motion], members["bead"][in_motion]] = members["track"][in_motion]
-    track = track if motion.numbers is None else track[:, motion.numbers]  # a motion need not have all beads
+    track = (
+        track if motion.numbers is None else track[:, motion.numbers]
+    )  # a motion need not have all beads
     return track, np.append(climbed, False)[track]
 
 
-def _state_of(motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[Cluster], floor: int) -> dict[str, Any]:
+def _state_of(
+    motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[Cluster], floor: int
+) -> dict[str, Any]:
     """The columns of ``bed`` in a frame."""
     frame = bridges.frame
     at_wall = clusters.at_sides(bridges, len(motion.radius), floor)
     position, radius, large = motion.position[frame], motion.radius, motion.large
     # Cells of the cross-section are about four large radii wide. Without a bulk the floor is the surface.
-    tops = _surface_cells(position[bulk], radius[bulk], motion.case.boundary, 4.0 * float(radius.max()))
-    low, middle, high = (float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0)))
+    tops = _surface_cells(
+        position[bulk], radius[bulk], motion.case.boundary, 4.0 * float(radius.max())
+    )
+    low, middle, high = (
+        float(value) for value in np.percentile(tops if len(tops) else [0.0], (10.0, 50.0, 90.0))
+    )
     pairs = len(bridges.beads)
     touching = int((bridges.gap[:pairs] <= 0.0).sum())
     return {
@@ -151,14 +162,20 @@ def _state_of(motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[
         "at_wall": int(at_wall.sum()),
         "large_at_wall": int((at_wall & large).sum()),
         "clusters": len(held),
-        "highest": max([middle, *(float(position[bead, 2]) for members, _ in held for bead in members)]),
+        "highest": max(
+            [middle, *(float(position[bead, 2]) for members, _ in held for bead in members)]
+        ),
     }
 
 
-def _surface_cells(position: FloatArray, radius: FloatArray, container: Boundary, cell: float) -> FloatArray:
+def _surface_cells(
+    position: FloatArray, radius: FloatArray, container: Boundary, cell: float
+) -> FloatArray:
     """Height of the highest bead top in each x-y cell with beads, m."""
     across = max(1, int(container.inner_width / cell))
-    place = np.clip(((position[:, :2] / container.inner_width + 0.5) * across).astype(int), 0, across - 1)
+    place = np.clip(
+        ((position[:, :2] / container.inner_width + 0.5) * across).astype(int), 0, across - 1
+    )
     tops = np.full(across * across, -np.inf)
     np.maximum.at(tops, place[:, 0] * across + place[:, 1], position[:, 2] + radius)
     highest: FloatArray = tops[np.isfinite(tops)]

@@ -22,7 +22,10 @@ ENDS = {
     "low": ("5 %", f"5 % {_BAND}"),
     "high": ("95 %", f"95 % {_BAND}"),
     "draws": ("draws of the band", f"number {_BAND}"),
-    "approximate": ("band approximate", "whether these draws are too few for more than an approximate band"),
+    "approximate": (
+        "band approximate",
+        "whether these draws are too few for more than an approximate band",
+    ),
     "error": ("numerical error", "numerical error, of time step and stiffness"),
 }
 """Ends of names of bands and of numerical errors, as in ``velocity_low``: words of their labels, meaning."""
@@ -60,11 +63,17 @@ def _quantities(entries: Mapping[str, str | list[str]]) -> tuple[Quantity, ...]:
     return tuple(quantities)
 
 
-TABLES: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(columns) for name, columns in _FILE["tables"].items()}
+TABLES: Mapping[str, tuple[Quantity, ...]] = {
+    name: _quantities(columns) for name, columns in _FILE["tables"].items()
+}
 """The columns of the tables of runs, in their order."""
-GROUPS: Mapping[str, tuple[Quantity, ...]] = {name: _quantities(group) for name, group in _FILE["numbers"].items()}
+GROUPS: Mapping[str, tuple[Quantity, ...]] = {
+    name: _quantities(group) for name, group in _FILE["numbers"].items()
+}
 """The numbers of results: of each module of `walkers.postprocess.measure.results.MODULES`, and of all."""
-SHOWN: Mapping[str, frozenset[str]] = {name: frozenset(names) for name, names in _FILE["shown"].items()}
+SHOWN: Mapping[str, frozenset[str]] = {
+    name: frozenset(names) for name, names in _FILE["shown"].items()
+}
 """Which numbers are shown (`walkers.postprocess.measure.numbers.rows`), and which are of walkers that face up."""
 LABELS: Mapping[str, Mapping[str, str]] = _FILE["labels"]
 """Labels of numbers of walkers that face up or down: on a ``level`` boundary, on a ``slope``, and of ``both``."""
@@ -106,7 +115,9 @@ def declared(name: str, table: str = "") -> Quantity:
     for quantity in TABLES[table] if table else _NUMBERS:
         if matches(quantity.name, name):
             number = re.search(r"_(\d+)", name) if "*" in quantity.name else None
-            return replace(quantity, name=name, label=quantity.label.replace("*", number[1] if number else "*"))
+            return replace(
+                quantity, name=name, label=quantity.label.replace("*", number[1] if number else "*")
+            )
     raise KeyError(name)
 
 
@@ -130,7 +141,13 @@ def scatter_of(name: str) -> str:
 def ordered(names: Iterable[str]) -> list[str]:
     """Names of numbers in the order of their declarations; both ends of a band follow the number."""
     places = {quantity.name: place for place, quantity in enumerate(_NUMBERS)}
-    return sorted(names, key=lambda name: (places.get(re.sub(r"_\d+(?=_|$)", "_*", name), places.get(name, -1)), name))
+    return sorted(
+        names,
+        key=lambda name: (
+            places.get(re.sub(r"_\d+(?=_|$)", "_*", name), places.get(name, -1)),
+            name,
+        ),
+    )
 
 
 def described_columns(names: Iterable[str]) -> dict[str, tuple[str, str]]:

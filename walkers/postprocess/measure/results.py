@@ -27,7 +27,13 @@ from walkers.postprocess.measure.numbers import MAIN, headline, rows, state
 from walkers.postprocess.measure.tables import Columns, read_columns, read_table, write_table
 from walkers.postprocess.measure.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
 from walkers.rounding import counted, percent
-from walkers.runner.directory import SEGMENT_NAME, case_of, files_of_segments, recomputed, segment_directories
+from walkers.runner.directory import (
+    SEGMENT_NAME,
+    case_of,
+    files_of_segments,
+    recomputed,
+    segment_directories,
+)
 from walkers.runner.manifest import RESULT_NAME, check_unchanged
 
 if TYPE_CHECKING:
@@ -67,7 +73,11 @@ class Results(dict[str, Any]):
     """
 
     def __init__(
-        self, directory: Path, numbers: Mapping[str, Any], warnings: Sequence[str], about: Mapping[str, Any]
+        self,
+        directory: Path,
+        numbers: Mapping[str, Any],
+        warnings: Sequence[str],
+        about: Mapping[str, Any],
     ) -> None:
         super().__init__(numbers)
         self.directory, self.warnings, self.about = directory, warnings, about
@@ -117,7 +127,9 @@ def measure(directory: Path) -> None:
     notes = segment.get("by_hand") or []
     warnings = [*notes, *(warning for part in parts for warning in part.warnings)]
     if names := limits_of(case).exceeded_by(case.run.time_step):
-        warnings.append(f"the time step is beyond a limit of stability ({', '.join(names)}): the results are wrong")
+        warnings.append(
+            f"the time step is beyond a limit of stability ({', '.join(names)}): the results are wrong"
+        )
     if (softness := softness_warning(case)) is not None:
         warnings.append(softness)
     warnings += gravity_warnings(case)
@@ -154,14 +166,22 @@ def read(directory: str | Path, origins: Sequence[Origin] | None = None) -> Resu
         about["rests_on"] = rests_on(origins)
     numbers |= bands_of(directory, about["rests_on"], numbers)
     accuracy = accuracy_of(directory)
-    numbers |= {f"{name}_error": error["total"] for name, error in accuracy.get("errors", {}).items()}
+    numbers |= {
+        f"{name}_error": error["total"] for name, error in accuracy.get("errors", {}).items()
+    }
     if (main := f"{headline(numbers)}_error") in numbers:
         numbers["numerical_error"] = numbers[main]
     if not accuracy.get("reached", True):
         change = percent(float(f"{accuracy['change']:.2g}"))
-        warnings = [*warnings, f"the numerical error is not converged: the hardest beads still change {change}"]
+        warnings = [
+            *warnings,
+            f"the numerical error is not converged: the hardest beads still change {change}",
+        ]
     if accuracy.get("times") == 1.0:
-        warnings = [*warnings, "the beads cannot be harder: the numerical error is that of the time step alone"]
+        warnings = [
+            *warnings,
+            "the beads cannot be harder: the numerical error is that of the time step alone",
+        ]
     return Results(directory, numbers, warnings, about)
 
 
@@ -191,7 +211,9 @@ def recorded(directory: Path) -> dict[str, Any]:
         if versions is not None:
             versions = dict(versions)
         _ = [contents[name] for name in _BESIDE]
-        numbers = {name: nan if number is None else number for name, number in contents["numbers"].items()}
+        numbers = {
+            name: nan if number is None else number for name, number in contents["numbers"].items()
+        }
         if version == VERSION:  # every reader needs these numbers
             _ = numbers["goes_uphill"], "velocity" in numbers and numbers["facings_differ"]
         contents["numbers"] = numbers
@@ -235,8 +257,14 @@ def ensure_measured(directory: Path) -> None:
 
 def plain(numbers: Mapping[str, Any]) -> dict[str, Any]:
     """Numbers as JSON types: None for those that are not finite."""
-    plain = {name: number.item() if hasattr(number, "item") else number for name, number in numbers.items()}
-    return {name: None if isinstance(value, float) and not isfinite(value) else value for name, value in plain.items()}
+    plain = {
+        name: number.item() if hasattr(number, "item") else number
+        for name, number in numbers.items()
+    }
+    return {
+        name: None if isinstance(value, float) and not isfinite(value) else value
+        for name, value in plain.items()
+    }
 
 
 def text(results: Results, *, cached: bool = False) -> str:
@@ -257,7 +285,10 @@ def text(results: Results, *, cached: bool = False) -> str:
             first,
             *(f"  {line}" for line in rest),
             *missing,
-            *(f"  {row[0]:{label}}  {row[1]:>{value}} {row[2]:{unit}}  {row[3]}".rstrip() for row in table),
+            *(
+                f"  {row[0]:{label}}  {row[1]:>{value}} {row[2]:{unit}}  {row[3]}".rstrip()
+                for row in table
+            ),
             *(f"  warning: {warning}" for warning in results.warnings),
             *lines_of_rest(results.about["rests_on"]),
             *banded,
@@ -307,7 +338,9 @@ def not_computed(results: Results) -> NotComputed:
     return NotComputed(values, "velocity" in results and not has_error)
 
 
-BAND_NOTE = "5 to 95 % over the ranges of uncertain values only; the error of the model is not in it"
+BAND_NOTE = (
+    "5 to 95 % over the ranges of uncertain values only; the error of the model is not in it"
+)
 """What a band is, below a result and in reports."""
 
 

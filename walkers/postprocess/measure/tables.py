@@ -30,7 +30,10 @@ def numbered(name: str, values: npt.NDArray[Any]) -> Columns:
 def columns_of(rows: Iterable[Sequence[Any]], **kinds: type) -> Columns:
     """Columns of these names and types from rows, of which there may be none."""
     cells = list(zip(*rows, strict=True)) or [()] * len(kinds)
-    return {name: np.array(cell, dtype=kind) for (name, kind), cell in zip(kinds.items(), cells, strict=True)}
+    return {
+        name: np.array(cell, dtype=kind)
+        for (name, kind), cell in zip(kinds.items(), cells, strict=True)
+    }
 
 
 def write_table(directory: Path, name: str, columns: Columns) -> None:
@@ -42,16 +45,27 @@ def write_table(directory: Path, name: str, columns: Columns) -> None:
     import pyarrow.parquet as pq
 
     quantities = TABLES[name]
-    order = [column for quantity in quantities for column in columns if matches(quantity.name, column)]
-    missing = {quantity.name for quantity in quantities if not quantity.name.endswith("_*")} - columns.keys()
+    order = [
+        column for quantity in quantities for column in columns if matches(quantity.name, column)
+    ]
+    missing = {
+        quantity.name for quantity in quantities if not quantity.name.endswith("_*")
+    } - columns.keys()
     if wrong := missing | columns.keys() - set(order):
-        raise KeyError(f"columns of {name} that are missing or not declared: {', '.join(sorted(wrong))}")
+        raise KeyError(
+            f"columns of {name} that are missing or not declared: {', '.join(sorted(wrong))}"
+        )
     arrays = [_arrow(columns[column]) for column in order]
     fields = []
     for column, array in zip(order, arrays, strict=True):
         quantity = declared(column, name)
         unit = quantity.si_unit  # ``units`` and ``long_name`` are attributes of the CF conventions
-        metadata = {"unit": unit, "meaning": quantity.meaning, "units": unit, "long_name": quantity.label}
+        metadata = {
+            "unit": unit,
+            "meaning": quantity.meaning,
+            "units": unit,
+            "long_name": quantity.label,
+        }
         fields.append(pa.field(column, array.type, metadata=metadata))
     reals = [field.name for field in fields if pa.types.is_floating(field.type)]
     with beside(directory / f"{name}.parquet") as new:
@@ -74,7 +88,9 @@ def _arrow(values: npt.NDArray[Any]) -> Any:
         bits = pa.py_buffer(np.packbits(values, bitorder="little").tobytes())
         return pa.Array.from_buffers(pa.bool_(), len(values), [None, bits])
     kind = pa.from_numpy_dtype(values.dtype)
-    return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(np.ascontiguousarray(values))])
+    return pa.Array.from_buffers(
+        kind, len(values), [None, pa.py_buffer(np.ascontiguousarray(values))]
+    )
 
 
 def read_table(directory: str | Path, name: str) -> pd.DataFrame:
@@ -86,7 +102,9 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     table = _read(Path(directory), name)
     frame: pd.DataFrame = table.to_pandas()
     for name_of in ("units", "long_name"):
-        frame.attrs[name_of] = {field.name: field.metadata[name_of.encode()].decode() for field in table.schema}
+        frame.attrs[name_of] = {
+            field.name: field.metadata[name_of.encode()].decode() for field in table.schema
+        }
     return frame
 
 
@@ -126,4 +144,6 @@ def _read(directory: Path, name: str) -> Any:
         # Not pq.read_table, which imports pandas and pyarrow.dataset: a third of a second.
         return pq.ParquetFile(pa.BufferReader(read_regular(path))).read()
     except (OSError, ValueError) as error:  # errors of pyarrow are both
-        raise refused(path, f"cannot be read ({error}); walkers run {directory} measures the run again") from error
+        raise refused(
+            path, f"cannot be read ({error}); walkers run {directory} measures the run again"
+        ) from error

@@ -71,13 +71,17 @@ def measure(motion: Motion) -> Measured:
     if not drive.ramp and not any(map(isfinite, numbers.values())):
         low, high = (amplitude / ACCELERATION_OF_ONE_G for amplitude in (peaks.min(), peaks.max()))
         changing = f"the amplitude of the strongest line of the record lies between {low:.3g} and {high:.3g} g"
-        return Measured({"ramp": columns}, {}, (f"{changing}: the velocity is a mean over different drives",))
+        return Measured(
+            {"ramp": columns}, {}, (f"{changing}: the velocity is a mean over different drives",)
+        )
     doubts = []
     for verb in ("stops", "starts"):
         within = numbers[f"{verb}_within"]
         if within > _COARSE * numbers[f"{verb}_at"]:
             change = f"{within / ACCELERATION_OF_ONE_G:.2g} g in {WINDOW} cycles"
-            doubts.append(f"the drive at which a walker {verb} is uncertain: it changes by {change}")
+            doubts.append(
+                f"the drive at which a walker {verb} is uncertain: it changes by {change}"
+            )
     if len(case.walkers[0].radii) == 2:
         gamma0 = dimer_of(case).gamma0
         numbers |= {f"gamma0_{name}": gamma0(number) for name, number in numbers.items()}
@@ -146,6 +150,15 @@ def directions(peaks: FloatArray, noise: float) -> IntArray:
 
 def _crossed(moves: BoolArray, peaks: FloatArray, change: FloatArray) -> tuple[float, float]:
     """Mean drive of walkers at the end of the last window in which they move, if they rest after; and its change."""
-    ends = len(moves) - 1 - np.argmax(moves[::-1], axis=0) if len(moves) else np.zeros(0, dtype=np.int64)
-    ends = ends[[bool(column.any()) and end < len(moves) - 1 for column, end in zip(moves.T, ends, strict=False)]]
+    ends = (
+        len(moves) - 1 - np.argmax(moves[::-1], axis=0)
+        if len(moves)
+        else np.zeros(0, dtype=np.int64)
+    )
+    ends = ends[
+        [
+            bool(column.any()) and end < len(moves) - 1
+            for column, end in zip(moves.T, ends, strict=False)
+        ]
+    ]
     return (float(peaks[ends].mean()), float(change[ends].mean())) if len(ends) else (nan, nan)

@@ -82,7 +82,11 @@ def in_lines(text: str) -> list[str]:
 def held_of(origins: Sequence[Origin]) -> tuple[Origin, ...]:
     """Values of a case without a range, which a spread holds fixed: those of the liquid, and other unmeasured ones."""
     keys = {"liquid.name", *OF_LIQUIDS, *unmeasured()}
-    return tuple(value for value in origins if value.key in keys and value.origin != "derived" and not value.range)
+    return tuple(
+        value
+        for value in origins
+        if value.key in keys and value.origin != "derived" and not value.range
+    )
 
 
 def held_text(held: Sequence[Origin]) -> str:
@@ -106,7 +110,9 @@ def spread_of(directory: Path) -> Path:
     return directory.with_name(f"{directory.name}{SPREAD}")
 
 
-def bands_of(directory: Path, rests: Sequence[Mapping[str, Any]], numbers: Mapping[str, Any]) -> dict[str, float]:
+def bands_of(
+    directory: Path, rests: Sequence[Mapping[str, Any]], numbers: Mapping[str, Any]
+) -> dict[str, float]:
     """Bands of numbers (SI) by the spread beside a run: ``velocity_low``, ``velocity_high``, ``velocity_draws``, ….
 
     The spread must be over the ranges of the uncertain values ``rests``. A band is extended to the number of the case,
@@ -116,12 +122,21 @@ def bands_of(directory: Path, rests: Sequence[Mapping[str, Any]], numbers: Mappi
     with suppress(OSError, ValueError, KeyError, TypeError):
         spread = read_json(spread_of(directory.resolve()) / SPREAD_NAME)
         drawn, ranges = (
-            {value["key"]: value["range"] for value in part if value["range"]} for part in (spread["varied"], rests)
+            {value["key"]: value["range"] for value in part if value["range"]}
+            for part in (spread["varied"], rests)
         )
         for name, band in spread["bands"].items() if drawn == ranges else ():
             number = numbers.get(name)
-            ends = [band["low"], band["high"], *([number] if number is not None and isfinite(number) else [])]
-            bands |= {f"{name}_low": min(ends), f"{name}_high": max(ends), f"{name}_draws": band["points"]}
+            ends = [
+                band["low"],
+                band["high"],
+                *([number] if number is not None and isfinite(number) else []),
+            ]
+            bands |= {
+                f"{name}_low": min(ends),
+                f"{name}_high": max(ends),
+                f"{name}_draws": band["points"],
+            }
             bands[f"{name}_approximate"] = few_draws(band["points"], len(drawn))
     return bands
 
@@ -136,4 +151,6 @@ def accuracy_of(directory: Path) -> dict[str, Any]:
         return contents
     except (OSError, ValueError) as error:
         text = "was edited or is damaged; measure it again with"
-        raise refused(directory / ACCURACY_NAME, f"{text}: walkers run {directory} --accuracy") from error
+        raise refused(
+            directory / ACCURACY_NAME, f"{text}: walkers run {directory} --accuracy"
+        ) from error

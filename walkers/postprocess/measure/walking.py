@@ -21,7 +21,15 @@ from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.measure import gait
 from walkers.postprocess.measure.motion import NEAR, Group, Motion, came_near
 from walkers.postprocess.measure.numbers import Measured
-from walkers.postprocess.measure.sides import REST, SAME, SEPARATED, STEADY_SPEED, alike, differ, sides
+from walkers.postprocess.measure.sides import (
+    REST,
+    SAME,
+    SEPARATED,
+    STEADY_SPEED,
+    alike,
+    differ,
+    sides,
+)
 from walkers.postprocess.measure.tables import Columns, numbered
 from walkers.rounding import counted, percent
 
@@ -46,7 +54,12 @@ def derived(case: Case) -> dict[str, float]:
         return radii
     dimer = dimer_of(case)
     gamma0 = dimer.gamma0(case.excitation.peak_acceleration)
-    return {"gamma0": gamma0, "sin_delta": dimer.sin_delta, "mass_asymmetry": dimer.mass_asymmetry, **radii}
+    return {
+        "gamma0": gamma0,
+        "sin_delta": dimer.sin_delta,
+        "mass_asymmetry": dimer.mass_asymmetry,
+        **radii,
+    }
 
 
 def measure(motion: Motion) -> Measured:
@@ -58,7 +71,11 @@ def measure(motion: Motion) -> Measured:
     first_up = alike(first, uphill=case.goes_uphill)
     numbers = {
         **_velocities(walkers, case),
-        **{name: _mean(values[first_up]) for name, values in first.items() if name.startswith(_OF_BEADS)},
+        **{
+            name: _mean(values[first_up])
+            for name, values in first.items()
+            if name.startswith(_OF_BEADS)
+        },
         "walkers_met": walkers_met(groups),
         "meets": case.meets,
         "cycles": case.run.cycles,
@@ -69,7 +86,9 @@ def measure(motion: Motion) -> Measured:
         numbers |= _posture(groups, walkers)
     if motion.follows_cycles:
         numbers |= _work(groups, tables["cycles"], walkers)
-    for number, of_make in enumerate([tables["walkers"] for tables in of_makes], 1) if len(groups) > 1 else ():
+    for number, of_make in (
+        enumerate([tables["walkers"] for tables in of_makes], 1) if len(groups) > 1 else ()
+    ):
         velocity = of_make["velocity"][alike(of_make, uphill=case.goes_uphill)]
         numbers[f"velocity_make_{number}"] = float(velocity.mean())
         numbers[f"walkers_make_{number}"] = len(of_make["velocity"])
@@ -103,7 +122,9 @@ def _turning(groups: Sequence[Group], walkers: Columns) -> Iterable[str]:
         cycles = float(f"{_LONGER * (case.run.cycles + case.excitation.frequency * seconds):.2g}")
         turn = f"{count} of {counted(len(walkers['walker']), 'walker')} {'turns' if count == 1 else 'turn'}"
         away = f"{turn} away from the drive axis faster and faster, by 45° after about {seconds:.2g} s more"
-        small = int(np.concatenate([gait.small_angles_grow(group) for group in groups])[not_turned].sum())
+        small = int(
+            np.concatenate([gait.small_angles_grow(group) for group in groups])[not_turned].sum()
+        )
         if small == 1:
             away += "; the small angle of 1 other grows too"
         elif small:
@@ -118,7 +139,9 @@ def _stacked(parts: Sequence[Columns]) -> Columns:
     lengths = [len(part["walker"]) for part in parts]
     keys = dict.fromkeys(key for part in parts for key in part)
     return {
-        key: np.concatenate([part.get(key, np.full(rows, nan)) for part, rows in zip(parts, lengths, strict=True)])
+        key: np.concatenate(
+            [part.get(key, np.full(rows, nan)) for part, rows in zip(parts, lengths, strict=True)]
+        )
         for key in keys
     }
 
@@ -162,14 +185,22 @@ def tables_of(group: Group) -> dict[str, Columns]:
         "orientation": group.orientation[::strobe],
         "work": work,
     }
-    return {"trajectory": _of_frames(group, along), "walkers": walkers, "cycles": _of_frames(group, cycles)}
+    return {
+        "trajectory": _of_frames(group, along),
+        "walkers": walkers,
+        "cycles": _of_frames(group, cycles),
+    }
 
 
 def _of_frames(group: Group, columns: Columns) -> Columns:
     """Columns of values in F frames, shape (F,) or (F, W), one walker after the other."""
-    number, shape = [walker.walker for walker in group.walkers], (len(next(iter(columns.values()))), len(group.walkers))
+    number, shape = (
+        [walker.walker for walker in group.walkers],
+        (len(next(iter(columns.values()))), len(group.walkers)),
+    )
     wide = {"walker": np.broadcast_to(number, shape)} | {
-        name: values if values.ndim > 1 else np.broadcast_to(values[:, None], shape) for name, values in columns.items()
+        name: values if values.ndim > 1 else np.broadcast_to(values[:, None], shape)
+        for name, values in columns.items()
     }
     return {name: values.T.reshape(-1) for name, values in wide.items()}
 
@@ -178,7 +209,9 @@ def _by_kind(beads: int, **contacts: FloatArray) -> Columns:
     """Columns of values at contacts (as in `gait.Gait`): of beads with walls, and ``…_pair_…`` of pairs of beads."""
     columns: Columns = {}
     for name, values in contacts.items():
-        columns |= numbered(name, values[..., :beads]) | numbered(f"{name}_pair", values[..., beads:])
+        columns |= numbered(name, values[..., :beads]) | numbered(
+            f"{name}_pair", values[..., beads:]
+        )
     return columns
 
 
@@ -190,7 +223,10 @@ def _bridges(motion: Motion) -> Columns:
         pairs = motion.case.walkers[walker.make].pairs
         touching += [(walker.beads[lower], walker.beads[upper]) for lower, upper in pairs]
         contact_of |= {ends: number for number, ends in enumerate(touching, 1)}
-    parts = [{"frame": np.full(len(bridges), bridges.frame), **bridges.rows()} for bridges in motion.bridges]
+    parts = [
+        {"frame": np.full(len(bridges), bridges.frame), **bridges.rows()}
+        for bridges in motion.bridges
+    ]
     rows = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     first, second = rows["bead_1"], rows["bead_2"]
     owner = motion.walker_of[first]
@@ -198,7 +234,9 @@ def _bridges(motion: Motion) -> Columns:
     columns = {
         "time": motion.time[rows.pop("frame")],
         "walker": owner,
-        "contact": np.array([contact_of.get(ends, 0) for ends in zip(first.tolist(), second.tolist(), strict=True)]),
+        "contact": np.array(
+            [contact_of.get(ends, 0) for ends in zip(first.tolist(), second.tolist(), strict=True)]
+        ),
         "other_walker": np.where(joined == owner, -1, joined),
         **rows,
     }
@@ -218,7 +256,11 @@ def _scatter(values: FloatArray) -> float:
 
 
 def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
-    velocity, axial, end = walkers["velocity"], walkers["axial_velocity"], walkers["orientation_end"]
+    velocity, axial, end = (
+        walkers["velocity"],
+        walkers["axial_velocity"],
+        walkers["orientation_end"],
+    )
     facing = sides(walkers["facing"], walkers["start_angle"])
     right, left = facing > 0, facing < 0
     meant = velocity[alike(walkers, uphill=case.goes_uphill)]
@@ -271,15 +313,27 @@ def _work(groups: Sequence[Group], cycles: Columns, walkers: Columns) -> dict[st
 
 def _is_symmetric(case: Case) -> bool:
     drive = case.excitation
-    return not case.boundary.tilt and len(drive.harmonics) == 1 and abs(drive.direction[2]) in (0.0, 1.0)
+    return (
+        not case.boundary.tilt
+        and len(drive.harmonics) == 1
+        and abs(drive.direction[2]) in (0.0, 1.0)
+    )
 
 
 def _depends_on_start(walkers: Columns, facing: IntArray, case: Case) -> bool:
     """Whether steady walkers of one make differ; both directions are one if boundary and drive are symmetric."""
-    kept = walkers["steady"] & np.isnan(walkers["turned_at"]) & (walkers["separated_fraction"] < SEPARATED)
+    kept = (
+        walkers["steady"]
+        & np.isnan(walkers["turned_at"])
+        & (walkers["separated_fraction"] < SEPARATED)
+    )
     kind = 2 * walkers["make"] + (0 if _is_symmetric(case) else facing > 0)
-    velocities = (walkers["velocity"][kept & (kind == number)] for number in set(kind[kept].tolist()))
-    return not case.meets and any(differ(float(alike.min()), float(alike.max())) for alike in velocities)
+    velocities = (
+        walkers["velocity"][kept & (kind == number)] for number in set(kind[kept].tolist())
+    )
+    return not case.meets and any(
+        differ(float(alike.min()), float(alike.max())) for alike in velocities
+    )
 
 
 def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
@@ -301,4 +355,6 @@ def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
 def walkers_met(groups: Sequence[Group]) -> bool:
     """Whether two walkers came so close that they are not independent."""
     centres = [group.mass_centre[:: group.case.run.samples_per_cycle, :, :2] for group in groups]
-    return came_near(np.concatenate(centres, axis=1), NEAR * max(group.make.length for group in groups))
+    return came_near(
+        np.concatenate(centres, axis=1), NEAR * max(group.make.length for group in groups)
+    )

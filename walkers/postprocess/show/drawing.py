@@ -48,7 +48,9 @@ def plain_text(text: str) -> str:
     return "\n".join(map(printable, text.split("\n"))).replace("$", r"\$")
 
 
-def new_figure(width: float, height: float, *, mosaic: Any = None, **options: Any) -> tuple[Figure, Any]:
+def new_figure(
+    width: float, height: float, *, mosaic: Any = None, **options: Any
+) -> tuple[Figure, Any]:
     """A figure (size in inches) and its axes without the global state of pyplot, for `styled` functions.
 
     Options are those of `matplotlib.figure.Figure.subplots`, or with a ``mosaic`` those of ``subplot_mosaic``.
@@ -56,7 +58,9 @@ def new_figure(width: float, height: float, *, mosaic: Any = None, **options: An
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.subplots(**options) if mosaic is None else figure.subplot_mosaic(mosaic, **options)
+    return figure, figure.subplots(**options) if mosaic is None else figure.subplot_mosaic(
+        mosaic, **options
+    )
 
 
 def letter_panels(panels: Iterable[Axes]) -> None:
@@ -78,13 +82,21 @@ def legend_below(axes: Axes, **options: Any) -> Legend:
     from matplotlib.transforms import ScaledTranslation
 
     down = ScaledTranslation(0.0, -30.0 / 72.0, axes.figure.dpi_scale_trans)
-    options |= {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": axes.transAxes + down, "borderaxespad": 0.0}
+    options |= {
+        "bbox_to_anchor": (0.5, 0.0),
+        "bbox_transform": axes.transAxes + down,
+        "borderaxespad": 0.0,
+    }
     return axes.legend(loc="upper center", **options)
 
 
 def check_formats(formats: str | Sequence[str]) -> list[str]:
     """Formats as a list; they may be joined by commas. Raises `InputError` for any that is not in `FORMATS`."""
-    given = [form for text in ([formats] if isinstance(formats, str) else formats) for form in text.split(",")]
+    given = [
+        form
+        for text in ([formats] if isinstance(formats, str) else formats)
+        for form in text.split(",")
+    ]
     for form in given:
         if form not in FORMATS:
             raise refused("format", f"{form!r}: expected one of {', '.join(FORMATS)}")
@@ -98,7 +110,11 @@ def check_place(path: Path, *suffixes: str) -> None:
 
 
 def save_figure(
-    figure: Figure, path: Path, sources: Sequence[str], formats: str | Sequence[str] = ("png",), title: str = ""
+    figure: Figure,
+    path: Path,
+    sources: Sequence[str],
+    formats: str | Sequence[str] = ("png",),
+    title: str = "",
 ) -> list[Path]:
     """Write a figure beside its final place and rename it; each of the formats (`FORMATS`) replaces the suffix.
 
@@ -111,7 +127,12 @@ def save_figure(
     metadata: dict[str, dict[str, str | None]] = {
         "png": {"Title": name, "Source": runs, "Software": _MAKER},
         "svg": {"Title": name, "Source": runs, "Creator": _MAKER, "Date": None},
-        "pdf": {"Title": name, "Subject": f"Source: {runs}", "Creator": _MAKER, "CreationDate": None},
+        "pdf": {
+            "Title": name,
+            "Subject": f"Source: {runs}",
+            "Creator": _MAKER,
+            "CreationDate": None,
+        },
     }
     # One layout for all formats: each further one would begin with the last and give another result.
     styled(figure.draw_without_rendering)()

@@ -60,16 +60,28 @@ FIGURES: Mapping[str, Sequence[Panel]] = {
     "paths": (Panel("trajectory", "x", "y", "walker", _TRAY),),
     "climb": (
         Panel("members", "time", "height", "track", "Clusters' leaders", 3.2),
-        Panel("bed", "time", "brazil_nut brazil_nut_of_bulk", "", "Segregation: (z of large − z of small) / their sum"),
+        Panel(
+            "bed",
+            "time",
+            "brazil_nut brazil_nut_of_bulk",
+            "",
+            "Segregation: (z of large − z of small) / their sum",
+        ),
         Panel("bed", "time", "bridges contacts", "", "Bridges and contacts with other beads"),
     ),
 }
 MOST_NAMED = 12  # lines in a legend
 LEAST = {"m": 0.01, "rad": 0.1, "m/s": 0.01}
 """Smallest ranges of axes by unit, in mm, ° and mm/s, so that rounding errors do not look like motion."""
-_LETTERS, _LETTERS_OF_AN_INCH = 100, 13  # letters of a line of a title; of a y label per inch of its panel
+_LETTERS, _LETTERS_OF_AN_INCH = (
+    100,
+    13,
+)  # letters of a line of a title; of a y label per inch of its panel
 _ASIDE = 10.0  # smallest angle at the start (°) in a legend
-_BETWEEN, _BEFORE = 10, 3  # points of a smooth curve between samples; samples before it, which give its slope
+_BETWEEN, _BEFORE = (
+    10,
+    3,
+)  # points of a smooth curve between samples; samples before it, which give its slope
 _GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#8d99a1"
 _DASHES, _MARKERS = ("-", (0, (5, 1.5)), (0, (1, 1.2))), "os^Dv"
 _MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
@@ -83,7 +95,10 @@ def figures_of(results: Results) -> dict[str, Figure]:
     figures = {}
     if case.walkers:
         figures["walk"] = walk_figure(case, tables)
-        if case.run.samples_per_cycle >= LEAST_SAMPLES and tables("trajectory")["cycle"].max() >= 2.0:
+        if (
+            case.run.samples_per_cycle >= LEAST_SAMPLES
+            and tables("trajectory")["cycle"].max() >= 2.0
+        ):
             figures["gait"] = gait_figure(case, tables)
     if case.meets:
         figures["paths"] = paths_figure(case, tables)
@@ -92,7 +107,9 @@ def figures_of(results: Results) -> dict[str, Figure]:
     return figures
 
 
-def plot_run(directory: Path, destination: Path | None = None, formats: str | Sequence[str] = ("png",)) -> list[Path]:
+def plot_run(
+    directory: Path, destination: Path | None = None, formats: str | Sequence[str] = ("png",)
+) -> list[Path]:
     """Draw the figures of a run, ``walk``, ``gait``, ``paths`` or ``climb``, into a folder, by default that of the run.
 
     `InputError` for formats that are not in `walkers.postprocess.show.drawing.FORMATS`, and for a
@@ -119,9 +136,13 @@ def _draw(axes: Axes, panel: Panel, columns: Columns, looks: Sequence[Mapping[st
     for (name, rows), look in zip(lines, looks, strict=True):
         factor = axis(panel.table, name)[1]
         given = {"label": declared(name, panel.table).label} if len(names) > 1 else {}
-        axes.plot(x_factor * columns[panel.x][rows], factor * columns[name][rows], **{**given, **look})
+        axes.plot(
+            x_factor * columns[panel.x][rows], factor * columns[name][rows], **{**given, **look}
+        )
     axes.set(xlabel=x_label, title=panel.title)
-    axes.set_ylabel("\n".join(wrap(axis(panel.table, names[0])[0], round(_LETTERS_OF_AN_INCH * panel.height))))
+    axes.set_ylabel(
+        "\n".join(wrap(axis(panel.table, names[0])[0], round(_LETTERS_OF_AN_INCH * panel.height)))
+    )
     for name, limits, widen in (
         (panel.x, axes.dataLim.intervalx, axes.set_xlim),
         (names[0], axes.dataLim.intervaly, axes.set_ylim),
@@ -138,22 +159,39 @@ def looks_of(labels: Sequence[str]) -> list[dict[str, Any]]:
     """
     looks: list[dict[str, Any]] = [
         {
-            **{"label": label, "color": f"C{number}", "linestyle": _DASHES[number % len(_DASHES)], "linewidth": 0.9},
-            **{"marker": _MARKERS[number % len(_MARKERS)], "mfc": "none", "markevery": (0.02 * (number % 6), 0.12)},
+            **{
+                "label": label,
+                "color": f"C{number}",
+                "linestyle": _DASHES[number % len(_DASHES)],
+                "linewidth": 0.9,
+            },
+            **{
+                "marker": _MARKERS[number % len(_MARKERS)],
+                "mfc": "none",
+                "markevery": (0.02 * (number % 6), 0.12),
+            },
         }
         for number, label in enumerate(labels[:MOST_NAMED])
     ]
     more = len(labels) - len(looks)
     grey = {"color": _PALE, "linewidth": 0.5, "zorder": 1.5, "rasterized": True}
-    return looks + [grey | ({} if number else {"label": f"and {more} more"}) for number in range(more)]
+    return looks + [
+        grey | ({} if number else {"label": f"and {more} more"}) for number in range(more)
+    ]
 
 
 def _panels(
-    name: str, case: Case, tables: Mapping[str, Columns], looks: Sequence[Sequence[Mapping[str, Any]]], **words: object
+    name: str,
+    case: Case,
+    tables: Mapping[str, Columns],
+    looks: Sequence[Sequence[Mapping[str, Any]]],
+    **words: object,
 ) -> tuple[Figure, list[Axes]]:
     """A figure of `FIGURES`, whose titles have the words, with panels one below the other and no legends."""
     heights = [panel.height for panel in FIGURES[name]]
-    figure, grid = new_figure(TWO_COLUMNS, sum(heights), nrows=len(heights), height_ratios=heights, squeeze=False)
+    figure, grid = new_figure(
+        TWO_COLUMNS, sum(heights), nrows=len(heights), height_ratios=heights, squeeze=False
+    )
     panels = list(grid[:, 0])
     for axes, panel, look in zip(panels, FIGURES[name], looks, strict=True):
         _draw(axes, panel._replace(title=panel.title.format(**words)), tables[panel.table], look)
@@ -162,7 +200,11 @@ def _panels(
             upper.sharex(lower)
             upper.set_xlabel("")
             upper.tick_params(labelbottom=False)
-    title = [line for part in (case.title or case.name, *caption(case).split("; ")) for line in wrap(part, _LETTERS)]
+    title = [
+        line
+        for part in (case.title or case.name, *caption(case).split("; "))
+        for line in wrap(part, _LETTERS)
+    ]
     figure.suptitle(plain_text("\n".join(title)))
     return figure, panels
 
@@ -185,19 +227,31 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
     start = cycles["orientation"][cycles["cycle"] == 0]
     side = np.ones_like(walkers["facing"]) if case.meets else sides(walkers["facing"], start)
     turned = np.where(side == walkers["facing"], 0.0, np.copysign(np.pi, start))
-    cycles = cycles | {"orientation": cycles["orientation"] - np.repeat(turned, len(cycles["cycle"]) // len(turned))}
+    cycles = cycles | {
+        "orientation": cycles["orientation"]
+        - np.repeat(turned, len(cycles["cycle"]) // len(turned))
+    }
     labels = []
     for row in np.argsort(walkers["walker"]):
-        degrees, side_way = np.degrees(start - turned)[row], directions(uphill=uphill)[int(side[row] < 0)]
+        degrees, side_way = (
+            np.degrees(start - turned)[row],
+            directions(uphill=uphill)[int(side[row] < 0)],
+        )
         aside = f"{side_way} at {degrees:.0f}°" if abs(degrees) > _ASIDE else side_way
         velocity = rounded(1e3 * walkers["axial_velocity" if uphill else "velocity"][row], "mm/s")
-        labels.append(f"{walkers['walker'][row]}: {f'{degrees:.0f}°' if case.meets else aside}, {velocity} mm/s")
+        labels.append(
+            f"{walkers['walker'][row]}: {f'{degrees:.0f}°' if case.meets else aside}, {velocity} mm/s"
+        )
     direction = "uphill" if uphill else "along the heading"
     if uphill:
         names = {"distance": "along", "along": "across", "across": "along"}
         cycles |= {name: cycles[column] for name, column in names.items()}
     reference = "the drive axis" if case.meets else "the direction that the legend names"
-    seen = f"{case.boundary.tilted}, seen along its normal" if case.boundary.tilted else "seen from above"
+    seen = (
+        f"{case.boundary.tilted}, seen along its normal"
+        if case.boundary.tilted
+        else "seen from above"
+    )
     words = {"direction": direction, "reference": reference, "seen": seen}
     figure, panels = _panels("walk", case, {"cycles": cycles}, [looks_of(labels)] * 3, **words)
     settled = cycles["time"][case.for_cycles(int(cycles["cycle"].max())).run.settled_strobes]
@@ -216,12 +270,17 @@ def gait_figure(case: Case, tables: Tables) -> Figure:
     """Velocities of the first walker and of its beads in the last two cycles (Fig. 4 of Khan et al.), smooth."""
     trajectory, walkers = tables("trajectory"), tables("walkers")
     number = walkers["walker"][0]
-    last = np.flatnonzero(trajectory["walker"] == number)[-2 * case.run.samples_per_cycle - 1 - _BEFORE :]
+    last = np.flatnonzero(trajectory["walker"] == number)[
+        -2 * case.run.samples_per_cycle - 1 - _BEFORE :
+    ]
     names = ["velocity", *(name for name in trajectory if matches("rotation_*", name))]
     names = [name for name in names if np.isfinite(trajectory[name][last]).all()]
     smooth = _smooth({name: trajectory[name][last] for name in ("cycle", *names)}, "cycle")
     widths, colours = np.linspace(6.0, 1.1, len(names)), [_PALE, *(f"C{n}" for n in range(1, 99))]
-    looks = [{"color": colour, "linewidth": width} for colour, width in zip(colours, widths, strict=False)]
+    looks = [
+        {"color": colour, "linewidth": width}
+        for colour, width in zip(colours, widths, strict=False)
+    ]
     for look, name in zip(looks, names, strict=True):
         label, mean = declared(name, "trajectory").label, rounded(1e3 * walkers[name][0], "mm/s")
         look["label"] = f"{label}\n(mean of the run {mean} mm/s)"
@@ -240,7 +299,9 @@ def _smooth(columns: Columns, x: str) -> Columns:
     return {name: _interpolated(places, values, dense) for name, values in columns.items()}
 
 
-def _interpolated(places: npt.NDArray[Any], values: npt.NDArray[Any], dense: npt.NDArray[Any]) -> npt.NDArray[Any]:
+def _interpolated(
+    places: npt.NDArray[Any], values: npt.NDArray[Any], dense: npt.NDArray[Any]
+) -> npt.NDArray[Any]:
     """Values at dense places, by Akima's modified cubic interpolation.
 
     This is ``scipy.interpolate.Akima1DInterpolator(places, values, method="makima")(dense)``, without half a second
@@ -267,7 +328,10 @@ def _interpolated(places: npt.NDArray[Any], values: npt.NDArray[Any], dense: npt
     slopes[-2] = 2.0 * slopes[-3] - slopes[-4]
     slopes[-1] = 2.0 * slopes[-2] - slopes[-3]
     changes = np.abs(np.diff(slopes)) + 0.5 * np.abs(slopes[1:] + slopes[:-1])
-    before, after = changes[2:], changes[:-2]  # weights of the interval before a sample, and of that after it
+    before, after = (
+        changes[2:],
+        changes[:-2],
+    )  # weights of the interval before a sample, and of that after it
     weights = before + after
     mean = 0.5 * (slopes[3:] + slopes[:-3])  # where all slopes around a sample are zero
     is_curved = weights > 1e-9 * weights.max(initial=-np.inf)
@@ -289,11 +353,16 @@ def paths_figure(case: Case, tables: Tables) -> Figure:
     from matplotlib.patches import Circle
 
     trajectory, walkers = tables("trajectory"), tables("walkers")
-    x, y, angle = (trajectory[name].reshape(len(walkers["walker"]), -1) for name in ("x", "y", "orientation"))
+    x, y, angle = (
+        trajectory[name].reshape(len(walkers["walker"]), -1) for name in ("x", "y", "orientation")
+    )
     strobe = slice(None, None, case.run.samples_per_cycle)
     columns = {"walker": np.repeat(walkers["walker"], x[:, strobe].shape[1])}
     columns |= {"x": x[:, strobe].ravel(), "y": y[:, strobe].ravel()}
-    looks = [look | {"marker": "", "linestyle": "-"} for look in looks_of([f"walker {n}" for n in range(len(x))])]
+    looks = [
+        look | {"marker": "", "linestyle": "-"}
+        for look in looks_of([f"walker {n}" for n in range(len(x))])
+    ]
     reach = 2.0 * max(make.length for make in case.walkers)
     height = 0.7 * TWO_COLUMNS * min(1.2, max(0.3, (np.ptp(y) + reach) / (np.ptp(x) + reach)))
     figure, (axes,) = _panels("paths", case, {"trajectory": columns}, [looks])
@@ -304,7 +373,10 @@ def paths_figure(case: Case, tables: Tables) -> Figure:
         place, weights = np.array(make.design), np.array(make.radii) ** 3
         place = walkers["facing"][row] * (place - weights @ place / weights.sum())
         turn = np.array(
-            [[np.cos(angle[row, -1]), np.sin(angle[row, -1])], [-np.sin(angle[row, -1]), np.cos(angle[row, -1])]]
+            [
+                [np.cos(angle[row, -1]), np.sin(angle[row, -1])],
+                [-np.sin(angle[row, -1]), np.cos(angle[row, -1])],
+            ]
         )
         beads = place @ turn @ np.array([drive, across])[:, :2] + [x[row, -1], y[row, -1]]
         for bead, radius in zip(beads, make.radii, strict=True):
@@ -312,8 +384,12 @@ def paths_figure(case: Case, tables: Tables) -> Figure:
             axes.add_patch(Circle(1e3 * bead, 1e3 * radius, fc=colour, ec="none", alpha=0.5))
     if case.boundary.closed:
         edge = np.linspace(-0.55, 0.55, 221) * case.boundary.inner_width
-        places = np.stack(np.meshgrid(edge, edge, case.boundary.inner_height / 2.0), axis=-1)[:, :, 0]
-        inside = case.boundary.geometry.side_clearance(places.reshape(-1, 3)).reshape(places.shape[:2])
+        places = np.stack(np.meshgrid(edge, edge, case.boundary.inner_height / 2.0), axis=-1)[
+            :, :, 0
+        ]
+        inside = case.boundary.geometry.side_clearance(places.reshape(-1, 3)).reshape(
+            places.shape[:2]
+        )
         axes.contour(1e3 * edge, 1e3 * edge, inside, levels=[0.0], colors=[_GREY], linewidths=1.0)
     axes.set_aspect("equal")
     axes.margins(0.08)
@@ -328,13 +404,20 @@ def climb_figure(case: Case, tables: Tables) -> Figure:
     lines = {name: values[leads] for name, values in members.items()}
     named, looks = np.cumsum(clusters["climbed"]), []
     for track in np.unique(lines["track"]):
-        leader, speed = "large" if clusters["leader_large"][track] else "small", clusters["speed"][track] * 1e3
+        leader, speed = (
+            "large" if clusters["leader_large"][track] else "small",
+            clusters["speed"][track] * 1e3,
+        )
         text = f"{clusters['size'][track]} beads climb, led by a\n{leader} one: {speed:.1f} mm/s"
         look: dict[str, Any] = {"color": _OTHERS, "linewidth": 0.6}
         if clusters["climbed"][track]:
             look = {"color": f"C{named[track]}", "linewidth": 1.6, "label": text}
             if named[track] > MOST_NAMED:
-                look["label"] = f"and {named[-1] - MOST_NAMED} more climbs" if named[track] == MOST_NAMED + 1 else ""
+                look["label"] = (
+                    f"and {named[-1] - MOST_NAMED} more climbs"
+                    if named[track] == MOST_NAMED + 1
+                    else ""
+                )
         looks.append(look)
     if not_climbing := [look for look in looks if "label" not in look]:
         not_climbing[0]["label"] = "clusters that\ndid not climb"

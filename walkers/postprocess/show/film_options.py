@@ -21,7 +21,9 @@ def _size(_type: Any, tokens: Any) -> tuple[int, int]:
     if numbers := re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower()):
         return int(numbers[1]), int(numbers[2])
     if text not in _SIZES:
-        raise refused("size", f"{text!r}: expected {', '.join(_SIZES)}, or width and height such as 1280x720")
+        raise refused(
+            "size", f"{text!r}: expected {', '.join(_SIZES)}, or width and height such as 1280x720"
+        )
     return _SIZES[text]
 
 
@@ -62,7 +64,8 @@ class FilmOptions:
     """
 
     size: Annotated[
-        tuple[int, int], Parameter(converter=_size, n_tokens=1, metavar="SIZE", show_default=lambda _: "720p")
+        tuple[int, int],
+        Parameter(converter=_size, n_tokens=1, metavar="SIZE", show_default=lambda _: "720p"),
     ] = _SIZES["720p"]
     fps: int = 25
     slowdown: float | None = None

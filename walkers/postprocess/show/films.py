@@ -26,15 +26,26 @@ from walkers.postprocess.show.film_options import FilmOptions
 from walkers.postprocess.show.necks import bridges_at, bridges_text
 from walkers.progress import Progress, Tell
 
-_AROUND, _AROUND_TRAY = 1.2, 1.3  # extent of the picture over that of the paths of the beads, or of the tray
-_LETTERS, _WIDE, _LEAST_LETTERS = 24, 42, 15  # lines and heights of a line per picture; smallest height, pixels
+_AROUND, _AROUND_TRAY = (
+    1.2,
+    1.3,
+)  # extent of the picture over that of the paths of the beads, or of the tray
+_LETTERS, _WIDE, _LEAST_LETTERS = (
+    24,
+    42,
+    15,
+)  # lines and heights of a line per picture; smallest height, pixels
 _SECONDS = 10.0  # largest duration of a film without a given slowdown, s
 _LEAST_SEEN = 10.0  # smallest number of recorded frames per second of such a film, if they do not resolve the cycle
 _COLOURS, _SAMPLES = 40, 6  # colours of a GIF; pictures from which they are chosen
 
 
 def render_film(
-    directory: Path, to: Path | None = None, options: FilmOptions = FilmOptions(), *, on_progress: Tell | None = None
+    directory: Path,
+    to: Path | None = None,
+    options: FilmOptions = FilmOptions(),
+    *,
+    on_progress: Tell | None = None,
 ) -> Path:
     """Render a film (MP4 or GIF, by default ``film.mp4`` in the run directory); see `FilmOptions` for what it shows.
 
@@ -97,7 +108,9 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
     last, begin = float(motion.time[-1]), options.begin
     end = last if options.end is None else min(options.end, last)
     if not 0.0 <= begin < end:
-        message = f"nothing to show: expected times within the drive, 0 to {last:.4g} s, begin before end"
+        message = (
+            f"nothing to show: expected times within the drive, 0 to {last:.4g} s, begin before end"
+        )
         raise refused("begin, end", message)
     follows, slowdown = motion.follows_cycles, options.slowdown
     if slowdown is None:
@@ -135,20 +148,33 @@ def _captions(
     speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
     bar = view.round_below(wide / 5.0 / pixels_per_mm)
     toward, direction = view.named_direction(scene.motion)
-    left, right, level, thick = wide - edge - bar * pixels_per_mm, wide - edge, tall - edge, max(2, edge // 8)
+    left, right, level, thick = (
+        wide - edge - bar * pixels_per_mm,
+        wide - edge,
+        tall - edge,
+        max(2, edge // 8),
+    )
 
     def written(picture: view.Picture, number: int) -> view.Picture:
         page = Image.fromarray(picture)
         draw = ImageDraw.Draw(page)
         clock, lines = f"{times.time[number]:.{decimals}f} s", [speed]
         if scene.path is not None:
-            lines.append(f"{scene.moved(times.frame[number]) @ toward:z.1f} mm {direction} from the start")
+            lines.append(
+                f"{scene.moved(times.frame[number]) @ toward:z.1f} mm {direction} from the start"
+            )
         lines += [case.boundary.tilted] if case.boundary.tilted else []
         lines += scene.explained
         lines += bridges_text(case).split(", ")  # lines of their own beside the beads
         draw.text((edge, edge), clock, "black", large, anchor="lt")
         if above:
-            draw.text((2 * edge + large.getlength(clock), 1.2 * edge), ", ".join(lines), "#333333", small, anchor="lt")
+            draw.text(
+                (2 * edge + large.getlength(clock), 1.2 * edge),
+                ", ".join(lines),
+                "#333333",
+                small,
+                anchor="lt",
+            )
         else:
             for row, text in enumerate(lines):
                 draw.text((edge, (2.8 + 1.5 * row) * edge), text, "#333333", small, anchor="lt")
@@ -156,10 +182,15 @@ def _captions(
         if case.boundary.tilted and case.environment.gravity:
             tip = 5.5 * edge
             draw.line([right, edge, right, tip - edge], "black", thick)
-            draw.polygon([right - 0.4 * edge, tip - edge, right + 0.4 * edge, tip - edge, right, tip], "black")
+            draw.polygon(
+                [right - 0.4 * edge, tip - edge, right + 0.4 * edge, tip - edge, right, tip],
+                "black",
+            )
             draw.text((right - 0.8 * edge, 3.0 * edge), "g", "black", large, anchor="rm")
         draw.rectangle([left, level - thick, right, level], "black")
-        draw.text(((left + right) / 2.0, level - 1.5 * thick), f"{bar:g} mm", "black", small, anchor="md")
+        draw.text(
+            ((left + right) / 2.0, level - 1.5 * thick), f"{bar:g} mm", "black", small, anchor="md"
+        )
         return np.asarray(page)
 
     return written
@@ -172,7 +203,9 @@ def speed_text(slowdown: float) -> str:
     return f"{slowdown:.4g} × slower" if slowdown > 1.0 else f"{1.0 / slowdown:.4g} × faster"
 
 
-def _write_mp4(path: Path, pictures: Iterator[view.Picture], options: FilmOptions, count: int) -> None:
+def _write_mp4(
+    path: Path, pictures: Iterator[view.Picture], options: FilmOptions, count: int
+) -> None:
     """Write H.264 with ffmpeg, which does not report a full disk."""
     from imageio_ffmpeg import count_frames_and_secs, write_frames
 
@@ -180,7 +213,13 @@ def _write_mp4(path: Path, pictures: Iterator[view.Picture], options: FilmOption
     # own, for files that are larger by a tenth.
     how = ["-movflags", "+faststart", "-preset", "veryfast"]
     writer = write_frames(
-        path, options.size, fps=options.fps, codec="libx264", quality=7, macro_block_size=2, output_params=how
+        path,
+        options.size,
+        fps=options.fps,
+        codec="libx264",
+        quality=7,
+        macro_block_size=2,
+        output_params=how,
     )
     writer.send(None)
     try:
@@ -193,13 +232,22 @@ def _write_mp4(path: Path, pictures: Iterator[view.Picture], options: FilmOption
     except (RuntimeError, OSError):
         written = 0
     if written != count:
-        raise WalkersError(f"ffmpeg wrote {written} of the {count} pictures of {path.parent}: is the disk full?")
+        raise WalkersError(
+            f"ffmpeg wrote {written} of the {count} pictures of {path.parent}: is the disk full?"
+        )
 
 
-def _write_gif(path: Path, pictures: Iterator[view.Picture], fps: int, samples: view.Picture) -> None:
+def _write_gif(
+    path: Path, pictures: Iterator[view.Picture], fps: int, samples: view.Picture
+) -> None:
     """Write all pictures with one palette and no dithering, so that parts at rest need no space."""
     from PIL import Image
 
     palette = Image.fromarray(samples).quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
-    reduced = (Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures)
-    next(reduced).save(path, save_all=True, append_images=reduced, duration=1000 // fps, loop=0, optimize=False)
+    reduced = (
+        Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
+        for picture in pictures
+    )
+    next(reduced).save(
+        path, save_all=True, append_images=reduced, duration=1000 // fps, loop=0, optimize=False
+    )

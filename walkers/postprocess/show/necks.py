@@ -25,14 +25,19 @@ BLUE, OPACITY = 0x3FA0FF, 0.8
 EXPLAINED = "blue: liquid bridges"
 Ends = tuple[FloatArray, FloatArray]
 NO_BRIDGES: IntArray = np.empty((0, 3), dtype=np.int64)
-_ENDS, _WAIST = 1.12, 0.92  # width of a curved meniscus at its ends and in its middle over that of the straight one
+_ENDS, _WAIST = (
+    1.12,
+    0.92,
+)  # width of a curved meniscus at its ends and in its middle over that of the straight one
 _WIDEST = 0.9  # largest width of a neck over that of the smaller bead
 
 
 def bridges_at(motion: Motion, frames: npt.ArrayLike) -> list[IntArray]:
     """Contacts of the recorded bridges that are nearest in time to each of some frames."""
     frames, stride = np.asarray(frames), motion.case.run.samples_per_bridge_sample
-    recorded = np.array([frame for frame, (_, number) in enumerate(motion.frames) if number % stride == 0])
+    recorded = np.array(
+        [frame for frame, (_, number) in enumerate(motion.frames) if number % stride == 0]
+    )
     if not len(recorded):
         return [NO_BRIDGES] * len(frames)
     nearest = recorded[np.abs(np.subtract.outer(frames, recorded)).argmin(axis=1)].tolist()
@@ -44,7 +49,9 @@ def bridges_text(case: Case) -> str:
     """What is blue, and how often the bridges were recorded if not in every frame."""
     every = case.run.samples_per_cycle // case.run.samples_per_bridge_sample
     often = "once" if every == 1 else f"{every} times"
-    return EXPLAINED + (f", recorded {often} per cycle" if case.run.samples_per_bridge_sample > 1 else "")
+    return EXPLAINED + (
+        f", recorded {often} per cycle" if case.run.samples_per_bridge_sample > 1 else ""
+    )
 
 
 def ends_of(motion: Motion, place: FloatArray, contacts: IntArray) -> Ends:
@@ -59,18 +66,27 @@ def ends_of(motion: Motion, place: FloatArray, contacts: IntArray) -> Ends:
     return begins, ends
 
 
-def at_front_walls(motion: Motion, contacts: IntArray, ends: Ends, toward: FloatArray) -> npt.NDArray[np.bool_]:
+def at_front_walls(
+    motion: Motion, contacts: IntArray, ends: Ends, toward: FloatArray
+) -> npt.NDArray[np.bool_]:
     """Which contacts are with walls between the beads and a camera in the direction ``toward``, shape (K,).
 
     Pictures do not draw these walls, so that the beads are visible.
     """
     begins, second_ends = ends
     to_walls = contacts[:, 2] >= 0
-    return np.asarray(to_walls & ((second_ends - begins) @ toward > 0.5 * motion.radius[contacts[:, 0]]))
+    return np.asarray(
+        to_walls & ((second_ends - begins) @ toward > 0.5 * motion.radius[contacts[:, 0]])
+    )
 
 
 def necks_of(
-    motion: Motion, contacts: IntArray, between: Ends, rings: int, sides: int, share: FloatArray | float = 1.0
+    motion: Motion,
+    contacts: IntArray,
+    between: Ends,
+    rings: int,
+    sides: int,
+    share: FloatArray | float = 1.0,
 ) -> Ends:
     """Points and normals of the necks of contacts, mm, shape (K, rings × sides, 3), ``between`` their ends (`ends_of`).
 
@@ -79,7 +95,9 @@ def necks_of(
     begins, ends = between
     radius = motion.radius[contacts[:, 0]]
     second_radius = np.where(contacts[:, 1] < 0, np.inf, motion.radius[contacts[:, 1]])
-    volume = np.vectorize(bridge_volume, [float], excluded=[2])(radius, second_radius, motion.case.liquid.of_bridges)
+    volume = np.vectorize(bridge_volume, [float], excluded=[2])(
+        radius, second_radius, motion.case.liquid.of_bridges
+    )
     reduced = 1.0 / (1.0 / radius + 1.0 / second_radius)
     length = np.linalg.norm(ends - begins, axis=1)
     beyond = np.where(np.isfinite(second_radius), second_radius, 0.0)
@@ -90,7 +108,10 @@ def necks_of(
     first = np.cross(along, np.eye(3)[np.abs(along).argmin(axis=1)])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     around = 2.0 * np.pi * np.arange(sides) / sides
-    out = np.cos(around)[:, None] * first[:, None] + np.sin(around)[:, None] * np.cross(along, first)[:, None]
+    out = (
+        np.cos(around)[:, None] * first[:, None]
+        + np.sin(around)[:, None] * np.cross(along, first)[:, None]
+    )
     # From the surface of the first bead to that of the second, or to the wall.
     low = np.sqrt(radius**2 - wide**2)
     high = length - np.sqrt(np.where(np.isfinite(second_radius), beyond**2 - wide**2, 0.0))
@@ -100,7 +121,9 @@ def necks_of(
     points = begins[:, None, None] + height[..., None, None] * along[:, None, None]
     points = points + width[..., None, None] * out[:, None]
     normals = np.broadcast_to(out[:, None], points.shape)
-    return 1e3 * points.reshape(len(contacts), rings * sides, 3), normals.reshape(len(contacts), rings * sides, 3)
+    return 1e3 * points.reshape(len(contacts), rings * sides, 3), normals.reshape(
+        len(contacts), rings * sides, 3
+    )
 
 
 def triangles_of(count: int, rings: int, sides: int) -> npt.NDArray[Any]:
@@ -108,6 +131,9 @@ def triangles_of(count: int, rings: int, sides: int) -> npt.NDArray[Any]:
     low, side = np.arange((rings - 1) * sides), np.arange((rings - 1) * sides) % sides
     beside = low - side + (side + 1) % sides
     corners = np.concatenate(
-        [np.stack([low, beside, low + sides], 1), np.stack([beside, beside + sides, low + sides], 1)]
+        [
+            np.stack([low, beside, low + sides], 1),
+            np.stack([beside, beside + sides, low + sides], 1),
+        ]
     )
     return (corners + rings * sides * np.arange(count)[:, None, None]).reshape(-1, 3)

@@ -31,11 +31,16 @@ SCRIPT = "show.py"
 """Name of the script that shows an export."""
 _COLLECTION = "walkers.pvd"
 _LISTED = re.compile(r'file="((?:beads|boundary|bridges)_\d+\.vtu)"')
-_WIDE, _AROUND = 16.0 / 9.0, 1.15  # width over height of the view; extent of the view over that of the motion
+_WIDE, _AROUND = (
+    16.0 / 9.0,
+    1.15,
+)  # width over height of the view; extent of the view over that of the motion
 _NECK = 0.45  # drawn radius of a bridge over the radius of the smallest bead
 
 
-def write_vtk(directory: Path, destination: Path | None = None, *, every: int | None = None) -> Path:
+def write_vtk(
+    directory: Path, destination: Path | None = None, *, every: int | None = None
+) -> Path:
     """Write a run for ParaView, with a script that shows it, and return the ``.pvd`` file with times in s.
 
     Each frame has the blocks ``beads``, ``boundary`` and, if they were recorded in it, ``bridges``; independent walkers
@@ -54,7 +59,9 @@ def write_vtk(directory: Path, destination: Path | None = None, *, every: int | 
     earlier, place = _earlier(destination), destination.absolute()
     motion = read_motion(directory)
     motion = gathered(motion) if motion.case.boundary.bare else motion
-    root = ElementTree.Element("VTKFile", type="Collection", version="0.1", byte_order="LittleEndian")
+    root = ElementTree.Element(
+        "VTKFile", type="Collection", version="0.1", byte_order="LittleEndian"
+    )
     root.set("view", json.dumps(_view(motion.driven)))
     entries = ElementTree.SubElement(root, "Collection")
     place.parent.mkdir(parents=True, exist_ok=True)
@@ -62,7 +69,11 @@ def write_vtk(directory: Path, destination: Path | None = None, *, every: int | 
         with scratch_folder(place.parent, VTK_SCRATCH) as new:
             for frame, meshes in _frames(motion, every or motion.case.run.samples_per_cycle):
                 for part, (kind, mesh) in enumerate(meshes.items()):
-                    entry = {"timestep": repr(float(motion.time[frame])), "part": str(part), "name": kind}
+                    entry = {
+                        "timestep": repr(float(motion.time[frame])),
+                        "part": str(part),
+                        "name": kind,
+                    }
                     entry["file"] = f"{kind}_{frame:06d}.vtu"
                     mesh.write(new / entry["file"])
                     ElementTree.SubElement(entries, "DataSet", entry)
@@ -73,7 +84,9 @@ def write_vtk(directory: Path, destination: Path | None = None, *, every: int | 
                 path.unlink()
             new.rename(place)  # refused by the system if the folder is not empty
     except OSError as error:
-        error.filename = error.filename or str(destination)  # a disk that is full does not say which
+        error.filename = error.filename or str(
+            destination
+        )  # a disk that is full does not say which
         raise
     return destination / _COLLECTION
 
@@ -81,8 +94,12 @@ def write_vtk(directory: Path, destination: Path | None = None, *, every: int | 
 def _earlier(place: Path) -> list[Path]:
     """Files of an earlier export in a folder, as its .pvd lists them; InputError if there is anything else."""
     collection, files = place / _COLLECTION, list(place.iterdir()) if place.is_dir() else []
-    listed = _LISTED.findall(collection.read_text("utf-8", "replace") if collection.is_file() else "")
-    foreign = sorted({path.name for path in files} - ({_COLLECTION, SCRIPT, *listed} if listed else set()))
+    listed = _LISTED.findall(
+        collection.read_text("utf-8", "replace") if collection.is_file() else ""
+    )
+    foreign = sorted(
+        {path.name for path in files} - ({_COLLECTION, SCRIPT, *listed} if listed else set())
+    )
     held = f"it holds {foreign[0]}" if foreign else "it is a file" if place.is_file() else ""
     if held := "it is a symbolic link" if place.is_symlink() else held:
         expected = "expected a new or empty folder, or a folder that walkers export has written"
@@ -103,7 +120,11 @@ def _frames(motion: Motion, every: int) -> Iterator[tuple[int, dict[str, meshio.
             if tracks is not None:
                 track, climber = (values[frame].astype(np.int64) for values in tracks)
                 component = connected(len(motion.radius), bridges.beads)
-                meshes["beads"].point_data |= {"component": component, "track": track, "is_climber": climber}
+                meshes["beads"].point_data |= {
+                    "component": component,
+                    "track": track,
+                    "is_climber": climber,
+                }
             if len(bridges):  # meshio does not read empty arrays
                 meshes["bridges"] = _bridges(motion, bridges)
             bridges = next(recorded, None)
@@ -124,7 +145,9 @@ def _beads(motion: Motion, frame: int) -> meshio.Mesh:
         **{"radius (m)": motion.radius, "omega (rad/s)": motion.spin[frame]},
         **{"velocity (m/s)": velocity, "speed (m/s)": np.linalg.norm(velocity, axis=1)},
     }
-    return meshio.Mesh(motion.position[frame] + motion.substrate[frame], {"vertex": beads[:, None]}, arrays)
+    return meshio.Mesh(
+        motion.position[frame] + motion.substrate[frame], {"vertex": beads[:, None]}, arrays
+    )
 
 
 def _bridges(motion: Motion, bridges: Bridges) -> meshio.Mesh:
@@ -140,11 +163,16 @@ def _bridges(motion: Motion, bridges: Bridges) -> meshio.Mesh:
     arrays = {
         **{name: rows[name] for name in ("bead_1", "bead_2", "wall")},
         **{"gap (m)": rows["gap"], "normal_force (N)": rows["normal_force"]},
-        **{"touching": rows["touching"].astype(np.int64), "walker": motion.walker_of[rows["bead_1"]]},
+        **{
+            "touching": rows["touching"].astype(np.int64),
+            "walker": motion.walker_of[rows["bead_1"]],
+        },
     }
     points = np.concatenate([begins, ends]) + motion.substrate[bridges.frame]
     lines = np.arange(len(points)).reshape(2, -1).T
-    return meshio.Mesh(points, {"line": lines}, cell_data={name: [array] for name, array in arrays.items()})
+    return meshio.Mesh(
+        points, {"line": lines}, cell_data={name: [array] for name, array in arrays.items()}
+    )
 
 
 def _walls(motion: Motion) -> meshio.Mesh:
@@ -161,10 +189,22 @@ def _view(motion: Motion) -> dict[str, Any]:
     tall = scene.height(_WIDE)
     camera, middle, up = scene.camera(10.0 * tall)
     # The scale of speeds ends at their 99th percentile.
-    fast = None if motion.walkers else float(np.percentile(np.linalg.norm(motion.velocity, axis=-1), 99.0))
+    fast = (
+        None
+        if motion.walkers
+        else float(np.percentile(np.linalg.norm(motion.velocity, axis=-1), 99.0))
+    )
     return {
         **{"colour": "walker" if motion.walkers else "speed (m/s)", "largest": fast},
-        **{"neck": _NECK * float(motion.radius.min()), "rounds": 48 if len(motion.radius) < 100 else 24},
+        **{
+            "neck": _NECK * float(motion.radius.min()),
+            "rounds": 48 if len(motion.radius) < 100 else 24,
+        },
         **{"closed": motion.case.boundary.closed, "tilted": motion.case.boundary.tilted},
-        **{"camera": [*(1e-3 * camera)], "middle": [*(1e-3 * middle)], "up": [*up], "half": 1e-3 * tall / 2.0},
+        **{
+            "camera": [*(1e-3 * camera)],
+            "middle": [*(1e-3 * middle)],
+            "up": [*up],
+            "half": 1e-3 * tall / 2.0,
+        },
     }

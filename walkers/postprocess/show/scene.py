@@ -22,7 +22,15 @@ from walkers.errors import refused
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure import piles
 from walkers.postprocess.measure.motion import Motion, between, visible_displacement
-from walkers.postprocess.show.necks import BLUE, NO_BRIDGES, OPACITY, at_front_walls, ends_of, necks_of, triangles_of
+from walkers.postprocess.show.necks import (
+    BLUE,
+    NO_BRIDGES,
+    OPACITY,
+    at_front_walls,
+    ends_of,
+    necks_of,
+    triangles_of,
+)
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -34,7 +42,10 @@ GLASS = (0x8C9AA5, 0xC9D2D8)
 """Colours of large and small beads: highlighted beads and the others."""
 _GROUND, _LINES, _WALL, _EDGE = "#e3e8eb", "#bcc6cd", "#eef1f3", "#5a6670"
 _SHADOW = 0.4  # opacity of a shadow below the centre of a bead
-_PALE, _BRIGHTEST = 0.72, 150.0  # share of white in the pale lunes; largest mean of red, green, blue in the dark ones
+_PALE, _BRIGHTEST = (
+    0.72,
+    150.0,
+)  # share of white in the pale lunes; largest mean of red, green, blue in the dark ones
 _LUNES = 6
 _FINE = ((10, 72, (9, 36)), (100, 30, (7, 24)), (500, 18, (5, 12)), (np.inf, 12, (3, 8)))
 """For fewer beads than the first number: cells around a ball; rings and sides of a neck."""
@@ -56,7 +67,10 @@ def shown_of(motion: Motion, walker: int | None) -> tuple[Motion, bool]:
         return motion, False
     number, count = walker or 0, len(motion.walkers)
     if not 0 <= number < count:
-        raise refused("walker", f"{number}: " + (f"expected 0 to {count - 1}" if count else "the run has no walkers"))
+        raise refused(
+            "walker",
+            f"{number}: " + (f"expected 0 to {count - 1}" if count else "the run has no walkers"),
+        )
     return motion.of_walkers(motion.walkers[number : number + 1]), True
 
 
@@ -89,7 +103,10 @@ def turned_in(motion: Motion) -> FloatArray | None:
 
     if motion.mean_spin is None and not motion.follows_cycles:
         return None
-    steps, now = motion.averaged.spin * np.diff(motion.time)[:, None, None], Rotation.identity(len(motion.radius))
+    steps, now = (
+        motion.averaged.spin * np.diff(motion.time)[:, None, None],
+        Rotation.identity(len(motion.radius)),
+    )
     turned = [now.as_quat()]
     for step in steps:
         now = Rotation.from_rotvec(step) * now
@@ -102,8 +119,12 @@ def rotations_at(turned: FloatArray, frame: float) -> FloatArray:
     from scipy.spatial.transform import Rotation
 
     number, share = int(frame), frame % 1.0
-    begin, end = (Rotation.from_quat(quaternions) for quaternions in turned[[number, number + ceil(share)]])
-    matrices: FloatArray = (Rotation.from_rotvec(share * (end * begin.inv()).as_rotvec()) * begin).as_matrix()
+    begin, end = (
+        Rotation.from_quat(quaternions) for quaternions in turned[[number, number + ceil(share)]]
+    )
+    matrices: FloatArray = (
+        Rotation.from_rotvec(share * (end * begin.inv()).as_rotvec()) * begin
+    ).as_matrix()
     return matrices
 
 
@@ -127,7 +148,12 @@ class Scene:
 
     @classmethod
     def around(
-        cls, motion: Motion, axes: FloatArray, share: float = 1.0, frames: slice = slice(None), **options: Any
+        cls,
+        motion: Motion,
+        axes: FloatArray,
+        share: float = 1.0,
+        frames: slice = slice(None),
+        **options: Any,
     ) -> Scene:
         """A view of the beads in some frames, and of the width and the floor of a container.
 
@@ -142,14 +168,20 @@ class Scene:
         seen, radius = 1e3 * seen @ axes.T, 1e3 * motion.radius[:, None]
         low, high = (seen - radius).min(axis=(0, 1)), (seen + radius).max(axis=(0, 1))
         if motion.case.boundary.closed and path is None:
-            half = 5e2 * motion.case.boundary.inner_width * np.array([1.0, axes[2, 2] > 0.5])  # from above also across
+            half = (
+                5e2 * motion.case.boundary.inner_width * np.array([1.0, axes[2, 2] > 0.5])
+            )  # from above also across
             low[:2], high[:2] = np.minimum(low[:2], -half), np.maximum(high[:2], half)
         wider = (share - 1.0) / 2.0 * (high - low)
         return cls(motion, axes, low - wider, high + wider, **options)
 
     def following(self, aspect: float, share: float = 1.0, frames: slice = slice(None)) -> Scene:
         """The same view (`around`), or, if the path of the beads is long, a closer one that follows the beads."""
-        options = {"shaken": self.shaken, "rolling": self.rolling, "path": path_of(self.motion, frames.start or 0)}
+        options = {
+            "shaken": self.shaken,
+            "rolling": self.rolling,
+            "path": path_of(self.motion, frames.start or 0),
+        }
         near = Scene.around(self.motion, self.axes, _ABOUT * share, frames, **options)
         return near if self.height(aspect) > _LONG * near.height(aspect) else self
 
@@ -202,7 +234,9 @@ def path_of(motion: Motion, begin: int = 0) -> FloatArray:
     """Displacement of the centre of the beads since a frame, smoothed over a cycle, mm, shape (F, 3)."""
     middle = 1e3 * motion.position.mean(axis=1)
     half = min(motion.case.run.samples_per_cycle, len(middle) - 1) // 2
-    beyond = np.pad(middle, ((half, half), (0, 0)), "reflect", reflect_type="odd")  # a straight path goes on
+    beyond = np.pad(
+        middle, ((half, half), (0, 0)), "reflect", reflect_type="odd"
+    )  # a straight path goes on
     smooth = np.lib.stride_tricks.sliding_window_view(beyond, 2 * half + 1, axis=0).mean(axis=-1)
     return np.asarray(smooth - smooth[begin])
 
@@ -303,10 +337,14 @@ def floor_lines(low: FloatArray, high: FloatArray, step: float) -> FloatArray:
 def round_below(value: float) -> float:
     """Largest of the numbers …, 1, 2, 5, 10, … that does not exceed a value."""
     decade = 10.0 ** np.floor(np.log10(value) + 1e-9)
-    return float(decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1.0 + 1e-9)))
+    return float(
+        decade * max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1.0 + 1e-9))
+    )
 
 
-def beach_ball(rounds: int, motion: Motion) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+def beach_ball(
+    rounds: int, motion: Motion
+) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """Points (shape (V, 3), also the normals), triangles (shape (T, 3)) and colours of a unit ball of six lunes.
 
     ``rounds``, a multiple of six, is the number of cells around it. Colours are 1 in pale lunes and 0 in dark ones. The
@@ -314,10 +352,15 @@ def beach_ball(rounds: int, motion: Motion) -> tuple[FloatArray, npt.NDArray[np.
     """
     import pyvista as pv
 
-    axis = np.cross([0.0, 0.0, 1.0], [1.0, 0.0, 0.0] if from_the_side(motion.case) else motion.case.drive_axis)
+    axis = np.cross(
+        [0.0, 0.0, 1.0], [1.0, 0.0, 0.0] if from_the_side(motion.case) else motion.case.drive_axis
+    )
     look: dict[str, Any] = {"theta_resolution": rounds // _LUNES, "phi_resolution": rounds // 2 + 1}
     ends = pairwise(np.linspace(0.0, 360.0, _LUNES + 1))
-    lunes = [pv.Sphere(radius=1.0, direction=axis, start_theta=begin, end_theta=end, **look) for begin, end in ends]
+    lunes = [
+        pv.Sphere(radius=1.0, direction=axis, start_theta=begin, end_theta=end, **look)
+        for begin, end in ends
+    ]
     ball = pv.merge(lunes, merge_points=False)
     points = np.asarray(ball.points)
     points = points / np.linalg.norm(points, axis=1, keepdims=True)
@@ -332,7 +375,11 @@ class Window:
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
         import pyvista as pv
 
-        self._scene, self._bare, radius = scene, scene.motion.case.boundary.bare, 1e3 * scene.motion.radius
+        self._scene, self._bare, radius = (
+            scene,
+            scene.motion.case.boundary.bare,
+            1e3 * scene.motion.radius,
+        )
         self._size, finer = (size[0], size[1]), [round(_FINER * length) for length in size]
         # In software, smooth edges by a finer picture and simple blending take half of the time of VTK's own ways.
         self._plotter = pv.Plotter(off_screen=True, window_size=finer, lighting="light kit")
@@ -344,19 +391,32 @@ class Window:
         self.pixels_per_mm = size[1] / tall
         self._place, self._middle, up = scene.camera(10.0 * tall)
         self._plotter.camera_position = [self._place, self._middle, up]
-        self._plotter.camera.parallel_projection, self._plotter.camera.parallel_scale = True, tall / 2.0
+        self._plotter.camera.parallel_projection, self._plotter.camera.parallel_scale = (
+            True,
+            tall / 2.0,
+        )
         self._around = self._floor(wide) if self._bare else self._walls(wide)
         self._plotter.camera.clipping_range = (0.1 * tall, 40.0 * wide)
         if self._bare:
             disc = pv.Disc(inner=0.0, outer=1.0, r_res=8, c_res=48).triangulate()
-            self._shadows = _Copies(self._plotter, disc.points, disc.regular_faces, radius, lighting=False)
+            self._shadows = _Copies(
+                self._plotter, disc.points, disc.regular_faces, radius, lighting=False
+            )
             black = np.zeros((disc.n_points, 4))
             black[:, 3] = 255.0 * _SHADOW * (1.0 - np.linalg.norm(disc.points, axis=1) ** 2) ** 2
             self._shadows.colour(np.tile(black, (len(radius), 1, 1)))
-        rounds, self._round = next((cells, neck) for most, cells, neck in _FINE if len(radius) < most)
+        rounds, self._round = next(
+            (cells, neck) for most, cells, neck in _FINE if len(radius) < most
+        )
         points, triangles, self._pale = beach_ball(rounds, scene.motion)
         self._beads = _Copies(self._plotter, points, triangles, radius, specular=0.4)
-        look = {"ambient": 0.45, "diffuse": 0.75, "specular": 0.4, "culling": "back", "interpolation": "Phong"}
+        look = {
+            "ambient": 0.45,
+            "diffuse": 0.75,
+            "specular": 0.4,
+            "culling": "back",
+            "interpolation": "Phong",
+        }
         liquid = pv.Property(color=f"#{BLUE:06x}", opacity=OPACITY, **look)
         self._necks = pv.Actor(mapper=pv.DataSetMapper(), prop=liquid)
         self._necks.mapper.scalar_visibility = False
@@ -376,18 +436,26 @@ class Window:
         if self._scene.shaken:
             time = np.interp([frame], np.arange(len(motion.time)), motion.time)
             shift = 1e3 * visible_displacement(motion.case.excitation, time)[0]
-        self._beads.colour(self._scene.colours(self._scene.pointed_out[number])[self._pale].swapaxes(0, 1))
-        self._beads.move(1e3 * place + shift, None if turned is None else rotations_at(turned, frame))
+        self._beads.colour(
+            self._scene.colours(self._scene.pointed_out[number])[self._pale].swapaxes(0, 1)
+        )
+        self._beads.move(
+            1e3 * place + shift, None if turned is None else rotations_at(turned, frame)
+        )
         if self._bare:
             self._shadows.move(1e3 * place * [1.0, 1.0, 0.0] + shift)
         self._wet(place, bridges, shift)
         for actor in self._around:
             actor.position = tuple(shift)
         moved = self._scene.moved(frame)
-        self._plotter.camera.SetPosition(self._place + moved)  # pyvista's own also looks for the limits of the scene
+        self._plotter.camera.SetPosition(
+            self._place + moved
+        )  # pyvista's own also looks for the limits of the scene
         self._plotter.camera.SetFocalPoint(self._middle + moved)
         self._plotter.render()  # a screenshot alone renders only the first time
-        picture = Image.fromarray(np.array(self._plotter.screenshot(return_img=True), dtype=np.uint8))
+        picture = Image.fromarray(
+            np.array(self._plotter.screenshot(return_img=True), dtype=np.uint8)
+        )
         return np.asarray(picture.resize(self._size, Image.Resampling.BOX))
 
     def close(self) -> None:
@@ -405,8 +473,12 @@ class Window:
         self._necks.visibility = bool(len(contacts))
         if not len(contacts):
             return
-        points, normals = (array.reshape(-1, 3) for array in necks_of(motion, contacts, between, *self._round))
-        necks = pv.PolyData.from_regular_faces(points + shift, triangles_of(len(contacts), *self._round))
+        points, normals = (
+            array.reshape(-1, 3) for array in necks_of(motion, contacts, between, *self._round)
+        )
+        necks = pv.PolyData.from_regular_faces(
+            points + shift, triangles_of(len(contacts), *self._round)
+        )
         necks.point_data["Normals"] = normals
         necks.point_data.active_normals_name = "Normals"
         self._necks.mapper.SetInputData(necks)
@@ -426,14 +498,18 @@ class Window:
         """Walls behind the beads and, slightly nearer to the camera, the edges of all walls."""
         faces = [1e3 * corners for corners in walls_of(self._scene.motion)]
         walls = mesh_of(faces).clean(tolerance=1e-6, absolute=True)
-        edges = walls.extract_feature_edges(feature_angle=30.0, manifold_edges=False, non_manifold_edges=False)
+        edges = walls.extract_feature_edges(
+            feature_angle=30.0, manifold_edges=False, non_manifold_edges=False
+        )
         edges.translate(1e-2 * wide * self._scene.axes[2], inplace=True)
         parts = [
             self._plotter.add_mesh(walls, color=_WALL, lighting=False, culling="back"),
             self._plotter.add_mesh(edges, color=_EDGE, line_width=3, lighting=False),
         ]
         if self._scene.path is not None:
-            marks = self._marks(faces, int(np.argmax(np.ptp(self._scene.path, axis=0))), round_below(wide / 8.0))
+            marks = self._marks(
+                faces, int(np.argmax(np.ptp(self._scene.path, axis=0))), round_below(wide / 8.0)
+            )
             parts.append(self._plotter.add_mesh(marks, color=_LINES, line_width=3, lighting=False))
         return parts
 
@@ -442,11 +518,15 @@ class Window:
         import pyvista as pv
 
         toward = self._scene.axes[2]
-        behind = [face for face in faces if np.cross(face[1] - face[0], face[2] - face[1]) @ toward > 0.0]
+        behind = [
+            face for face in faces if np.cross(face[1] - face[0], face[2] - face[1]) @ toward > 0.0
+        ]
         walls, along = mesh_of(behind), np.eye(3)[axis]
         low, high = walls.bounds[2 * axis : 2 * axis + 2]
         places = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
-        lines: pv.PolyData = pv.merge([walls.slice(normal=along, origin=place * along) for place in places])
+        lines: pv.PolyData = pv.merge(
+            [walls.slice(normal=along, origin=place * along) for place in places]
+        )
         lines.translate(1e-2 * step * toward, inplace=True)
         return lines
 
@@ -454,17 +534,26 @@ class Window:
 class _Copies:
     """Copies of a unit mesh, one per bead, with the positions, orientations and colours of a frame; mm."""
 
-    def __init__(self, plotter: pv.Plotter, points: Any, triangles: Any, radius: FloatArray, **look: Any) -> None:
+    def __init__(
+        self, plotter: pv.Plotter, points: Any, triangles: Any, radius: FloatArray, **look: Any
+    ) -> None:
         import pyvista as pv
 
         faces = (triangles + len(points) * np.arange(len(radius))[:, None, None]).reshape(-1, 3)
-        self._points, self._radius = np.asarray(points, np.float32), radius[:, None, None].astype(np.float32)
-        self._mesh = pv.PolyData(np.tile(self._points, (len(radius), 1)), np.insert(faces, 0, 3, axis=1).ravel())
+        self._points, self._radius = (
+            np.asarray(points, np.float32),
+            radius[:, None, None].astype(np.float32),
+        )
+        self._mesh = pv.PolyData(
+            np.tile(self._points, (len(radius), 1)), np.insert(faces, 0, 3, axis=1).ravel()
+        )
         self.colour(np.zeros((len(radius), len(points), 4 if "lighting" in look else 3)))
         self._mesh.point_data["Normals"] = np.asarray(self._mesh.points).copy()
         self._mesh.point_data.active_normals_name = "Normals"
         # The invisible halves of spheres are half of the work.
-        drawn = plotter.add_mesh(self._mesh, scalars="colour", rgb=True, smooth_shading=False, culling="back", **look)
+        drawn = plotter.add_mesh(
+            self._mesh, scalars="colour", rgb=True, smooth_shading=False, culling="back", **look
+        )
         drawn.prop.interpolation = "Phong"  # with these normals; pyvista would compute others
 
     def move(self, centres: FloatArray, turned: FloatArray | None = None) -> None:
@@ -472,9 +561,13 @@ class _Copies:
         turned = np.tile(np.eye(3), (len(centres), 1, 1)) if turned is None else turned
         # The points of a unit sphere are its normals.
         normals = self._points @ np.swapaxes(turned, 1, 2).astype(np.float32)
-        self._mesh.points = (self._radius * normals + centres[:, None].astype(np.float32)).reshape(-1, 3)
+        self._mesh.points = (self._radius * normals + centres[:, None].astype(np.float32)).reshape(
+            -1, 3
+        )
         self._mesh.point_data["Normals"] = normals.reshape(-1, 3)
 
     def colour(self, colours: FloatArray) -> None:
         """Set the colours of the points: red, green, blue and perhaps opacity, up to 255, shape (N, V, 3 or 4)."""
-        self._mesh.point_data["colour"] = colours.reshape(-1, colours.shape[-1]).round().astype(np.uint8)
+        self._mesh.point_data["colour"] = (
+            colours.reshape(-1, colours.shape[-1]).round().astype(np.uint8)
+        )

@@ -17,9 +17,23 @@ import numpy as np
 from walkers.arrays import FloatArray
 from walkers.errors import check_limits
 from walkers.postprocess.measure.motion import Motion, read_motion
-from walkers.postprocess.show.drawing import check_place, new_figure, plain_text, save_figure, styled
+from walkers.postprocess.show.drawing import (
+    check_place,
+    new_figure,
+    plain_text,
+    save_figure,
+    styled,
+)
 from walkers.postprocess.show.necks import EXPLAINED, bridges_at
-from walkers.postprocess.show.scene import Scene, Window, from_the_side, gathered, named_direction, plan_axes, shown_of
+from walkers.postprocess.show.scene import (
+    Scene,
+    Window,
+    from_the_side,
+    gathered,
+    named_direction,
+    plan_axes,
+    shown_of,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,7 +56,11 @@ _AROUND, _ASPECT = 1.1, 6.0
 
 @styled
 def render_series(
-    directory: Path, destination: Path | None = None, *, images: int = SHOWN, walker: int | None = None
+    directory: Path,
+    destination: Path | None = None,
+    *,
+    images: int = SHOWN,
+    walker: int | None = None,
 ) -> list[Path]:
     """Render views of a run in rows, with times and scales; walkers, climbers and liquid bridges are coloured.
 
@@ -62,7 +80,9 @@ def render_series(
         check_place(destination, ".png")
     motion, single = shown_of(read_motion(directory), walker)
     path = destination or directory / (PICTURE_NAME if single else SERIES_NAME)
-    figure = _figure(gathered(motion) if single else motion, even_frames(motion, images), follow=single)
+    figure = _figure(
+        gathered(motion) if single else motion, even_frames(motion, images), follow=single
+    )
     return save_figure(figure, path, [directory.name])
 
 
@@ -76,35 +96,63 @@ def even_frames(motion: Motion, count: int) -> list[int]:
     every, steps = (cycle, last // cycle) if last // cycle >= count - 1 else (1, last)
     if not (most := min(count - 1, steps)):
         return [start]
-    step = min(steps // most, -(-steps // most), key=lambda step: steps - step * min(most, steps // step))
+    step = min(
+        steps // most, -(-steps // most), key=lambda step: steps - step * min(most, steps // step)
+    )
     return [start + every * step * number for number in range(min(most, steps // step) + 1)]
 
 
 def even_labels(time: FloatArray) -> list[str]:
     """Evenly spaced times (s) as text with the required number of decimals."""
     between = float(time[-1] - time[0]) / max(len(time) - 1, 1)
-    decimals = next((places for places in range(2, 6) if abs(round(between, places) - between) <= 0.01 * between), 6)
+    decimals = next(
+        (
+            places
+            for places in range(2, 6)
+            if abs(round(between, places) - between) <= 0.01 * between
+        ),
+        6,
+    )
     return [f"{moment:.{decimals}f} s" for moment in time]
 
 
 def _figure(motion: Motion, frames: Sequence[int], *, follow: bool) -> Figure:
     """Pictures of frames with axes in mm; those of one walker in a column, or in a row if it goes up."""
-    case, sideways, driven = motion.case, from_the_side(motion.case), slice(motion.first_driven, None)
+    case, sideways, driven = (
+        motion.case,
+        from_the_side(motion.case),
+        slice(motion.first_driven, None),
+    )
     axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     axes = axes if sideways else plan_axes(motion, np.array([1.0, 0.0, 0.0]))
     around = 1.0 if sideways else _AROUND
     scene = Scene.around(motion, axes, around, driven, shaken=False)
     scene = scene.following(_ASPECT, around, driven) if follow else scene
     titles, tilted = even_labels(motion.time[frames]), case.boundary.tilted
-    names = ("x", "height") if sideways else ("across the slope", "uphill") if tilted else ("x", "y")
-    heading = [case.title or case.name, *([tilted] if tilted else []), ", ".join([*scene.explained, EXPLAINED])]
+    names = (
+        ("x", "height") if sideways else ("across the slope", "uphill") if tilted else ("x", "y")
+    )
+    heading = [
+        case.title or case.name,
+        *([tilted] if tilted else []),
+        ", ".join([*scene.explained, EXPLAINED]),
+    ]
     if scene.path is not None:
         toward, direction = named_direction(motion)
         names = ("", "")
-        titles = [f"{time}\n{scene.moved(frame) @ toward:z.1f} mm" for time, frame in zip(titles, frames, strict=True)]
+        titles = [
+            f"{time}\n{scene.moved(frame) @ toward:z.1f} mm"
+            for time, frame in zip(titles, frames, strict=True)
+        ]
         heading.insert(-1, f"the view follows the beads: time and displacement {direction}")
-    columns = (1 if np.ptp([scene.low, scene.high], axis=0)[:2].argmax() == 0 else len(frames)) if follow else 0
-    return _drawn(scene, frames, titles, [f"{name} (mm)".lstrip() for name in names], heading, columns)
+    columns = (
+        (1 if np.ptp([scene.low, scene.high], axis=0)[:2].argmax() == 0 else len(frames))
+        if follow
+        else 0
+    )
+    return _drawn(
+        scene, frames, titles, [f"{name} (mm)".lstrip() for name in names], heading, columns
+    )
 
 
 def _drawn(
@@ -128,7 +176,9 @@ def _drawn(
     width = columns * (inches * wide + _BESIDE) + 0.8
     lines = [line for text in heading for line in wrap(plain_text(text), round(13.0 * width))]
     height = rows * (inches * tall + _BENEATH) + _LINE * len(lines)
-    figure, axes = new_figure(width, height, nrows=rows, ncols=columns, squeeze=False, sharex=True, sharey=True)
+    figure, axes = new_figure(
+        width, height, nrows=rows, ncols=columns, squeeze=False, sharex=True, sharey=True
+    )
     figure.set_layout_engine("compressed")
     figure.suptitle("\n".join(lines), fontsize=10)
     extent = np.stack([scene.low, scene.high], axis=1)[:2].ravel().tolist()
@@ -140,9 +190,13 @@ def _drawn(
             panel.imshow(window.picture(frame, bridges), extent=extent, interpolation="antialiased")
             panel.set_title(title, fontsize=10)
             panel.grid(visible=False)
-            panel.spines["right"].set_visible(from_the_side(scene.motion.case))  # as the left one, a wall
+            panel.spines["right"].set_visible(
+                from_the_side(scene.motion.case)
+            )  # as the left one, a wall
             below, left = number + columns >= count, not number % columns
-            panel.tick_params(left=left, labelleft=left, bottom=below, labelbottom=below, labelsize=9)
+            panel.tick_params(
+                left=left, labelleft=left, bottom=below, labelbottom=below, labelsize=9
+            )
             panel.set_xlabel(labels[0] if below else "", fontsize=10)
             panel.set_ylabel(labels[1] if left else "", fontsize=10)
             panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])

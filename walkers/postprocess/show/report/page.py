@@ -44,7 +44,10 @@ def page_of(title: str, body: str, carried: Mapping[str, str] | None = None) -> 
         style=_text(_PACKAGE, "report.css"),
         carried={"library-k3d": _k3d(), **carried} if carried else {},
         scripts=scripts,
-        hashes=[base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts],
+        hashes=[
+            base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+            for script in scripts
+        ],
         written_by=f"{PROJECT} {software()['granular_walkers']}",
     )
 
@@ -58,7 +61,9 @@ def fill(template: str, package: str = _PACKAGE, **values: Any) -> str:
 def svg_of(figure: Figure) -> str:
     """A figure as SVG for a page: only what is referred to has an id."""
     text = StringIO()
-    figure.savefig(text, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type")))
+    figure.savefig(
+        text, format="svg", metadata=dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    )
     drawing = text.getvalue().partition("<svg")[2]
     return "<svg" + re.sub(r' id="[A-Za-z0-9.]+_[0-9]+"', "", drawing)
 
@@ -66,7 +71,11 @@ def svg_of(figure: Figure) -> str:
 @cache
 def _k3d() -> str:
     """The packed library; it contains its font as woff2, and browsers would look for other formats beside the page."""
-    source = re.sub(r',url\(fonts/[^)]*\) format\("(?:woff|truetype)"\)', "", _text("k3d", "static/standalone.js"))
+    source = re.sub(
+        r',url\(fonts/[^)]*\) format\("(?:woff|truetype)"\)',
+        "",
+        _text("k3d", "static/standalone.js"),
+    )
     return base64.b64encode(zlib.compress(source.encode(), 9)).decode()
 
 

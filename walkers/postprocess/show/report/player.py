@@ -55,9 +55,9 @@ def player_of(
 
     motion, stride, captions = _thinned(motion.driven, places)
     motion = view.gathered(motion, lane=_LANE)
-    scene = view.Scene.around(motion, view.camera_axes(motion), _AROUND, shaken=False, rolling=True).following(
-        _ASPECT, _AROUND
-    )
+    scene = view.Scene.around(
+        motion, view.camera_axes(motion), _AROUND, shaken=False, rolling=True
+    ).following(_ASPECT, _AROUND)
     shown, path = motion.select(slice(None, None, stride)), scene.path
     bridges = bridges_at(motion, np.arange(0, len(motion.time), stride))
     captions.append(f"{bridges_text(motion.case).capitalize()}.")
@@ -65,11 +65,28 @@ def player_of(
         path = path[::stride]
         shown = replace(shown, position=shown.position - 1e-3 * path[:, None])
         captions.append("The view follows the beads.")
-    colours = scene.colours(np.any(scene.pointed_out[::stride], axis=0)).round() @ [0x10000, 0x100, 1]
-    look: dict[str, Any] = {"grid_visible": False, "axes": ["x", "y", "z"], "background_color": 0xFFFFFF}
-    plot = k3d.plot(height=height, name=motion.case.name, fps=30.0, camera_fov=_VIEW, camera_auto_fit=False, **look)
+    colours = scene.colours(np.any(scene.pointed_out[::stride], axis=0)).round() @ [
+        0x10000,
+        0x100,
+        1,
+    ]
+    look: dict[str, Any] = {
+        "grid_visible": False,
+        "axes": ["x", "y", "z"],
+        "background_color": 0xFFFFFF,
+    }
+    plot = k3d.plot(
+        height=height,
+        name=motion.case.name,
+        fps=30.0,
+        camera_fov=_VIEW,
+        camera_auto_fit=False,
+        **look,
+    )
     if scene.turned is None:
-        captions.append("The rolling of the beads is not shown: the frames are too far apart in time.")
+        captions.append(
+            "The rolling of the beads is not shown: the frames are too far apart in time."
+        )
         beads = [_points(shown, colours[0])]
     else:
         beads = _balls(shown, scene.turned[::stride], colours)
@@ -80,9 +97,15 @@ def player_of(
         for part in boundary:
             part.model_matrix = _series(shown, back)
     if motion.case.boundary.tilted and motion.case.environment.gravity:
-        captions.append(f"{motion.case.boundary.tilted.capitalize()}; gravity points down at first.")
+        captions.append(
+            f"{motion.case.boundary.tilted.capitalize()}; gravity points down at first."
+        )
     toward = _axes_of_camera(motion)[2]
-    for part in [*boundary, *beads, *_necks(shown, motion.position[::stride], bridges, path, toward)]:
+    for part in [
+        *boundary,
+        *beads,
+        *_necks(shown, motion.position[::stride], bridges, path, toward),
+    ]:
         plot += part
     plot.fps_meter, plot.camera = False, camera_of(motion, scene.path)
     # K3D's own player plays the run in 12 s.
@@ -98,7 +121,10 @@ def camera_of(motion: Motion, path: FloatArray | None = None) -> list[float]:
     """
     axes = _axes_of_camera(motion)
     seen = view.Scene.around(motion, axes, _AROUND, shaken=False, path=path)
-    distance = seen.height(_ASPECT) / 2.0 / tan(radians(_VIEW / 2.0)) + float(seen.high[2] - seen.low[2]) / 2.0
+    distance = (
+        seen.height(_ASPECT) / 2.0 / tan(radians(_VIEW / 2.0))
+        + float(seen.high[2] - seen.low[2]) / 2.0
+    )
     place, middle, up = seen.camera(distance)
     return [*place.tolist(), *middle.tolist(), *up.tolist()]
 
@@ -119,8 +145,13 @@ def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
         motion = motion.of_walkers(sorted(firsts.values(), key=lambda walker: walker.walker))
         if len(firsts) < count:
             of_makes = "" if len(firsts) == 1 else " of each make"
-            captions.append(f"The view shows the first walker{of_makes}; the run has {count} walkers.")
-    stride, samples = ceil(len(motion.time) * len(motion.radius) / places), motion.case.run.samples_per_cycle
+            captions.append(
+                f"The view shows the first walker{of_makes}; the run has {count} walkers."
+            )
+    stride, samples = (
+        ceil(len(motion.time) * len(motion.radius) / places),
+        motion.case.run.samples_per_cycle,
+    )
     # A stride that divides a cycle, or is a multiple of one, gives the same phases in each cycle.
     divisors = (number for number in range(stride, samples + 1) if samples % number == 0)
     stride = next(divisors, ceil(stride / samples) * samples)
@@ -141,17 +172,29 @@ def _balls(motion: Motion, turned: FloatArray, colours: FloatArray) -> list[Any]
     balls, unit = [], points.astype(np.float32)
     for bead, radius in enumerate(motion.radius * 1e3):
         matrices = np.tile(np.eye(4), (len(motion.time), 1, 1))
-        matrices[:, :3, :3] = np.round(Rotation.from_quat(turned[:, bead]).as_matrix() * radius / _GRID) * _GRID
+        matrices[:, :3, :3] = (
+            np.round(Rotation.from_quat(turned[:, bead]).as_matrix() * radius / _GRID) * _GRID
+        )
         matrices[:, :3, 3] = np.round(motion.position[:, bead] * 1e3 / _GRID) * _GRID
-        look = {"colors": colours[pale, bead].astype(np.uint32), "flat_shading": False, "roughness": 0.6}
-        ball = k3d.mesh(unit, triangles.astype(np.uint32), normals=unit, name=f"bead {bead}", **look)
+        look = {
+            "colors": colours[pale, bead].astype(np.uint32),
+            "flat_shading": False,
+            "roughness": 0.6,
+        }
+        ball = k3d.mesh(
+            unit, triangles.astype(np.uint32), normals=unit, name=f"bead {bead}", **look
+        )
         ball.model_matrix = _series(motion, matrices)
         balls.append(ball)
     return balls
 
 
 def _necks(
-    motion: Motion, place: FloatArray, bridges: list[IntArray], path: FloatArray | None, toward: FloatArray
+    motion: Motion,
+    place: FloatArray,
+    bridges: list[IntArray],
+    path: FloatArray | None,
+    toward: FloatArray,
 ) -> list[Any]:
     """The necks of all bridges as one mesh with a time series of its points.
 
@@ -164,7 +207,9 @@ def _necks(
     if not len(contacts):
         return []
     bridged = np.zeros((len(bridges), len(contacts)), dtype=bool)
-    bridged[np.repeat(np.arange(len(bridges)), [len(of_frame) for of_frame in bridges]), held.ravel()] = True
+    bridged[
+        np.repeat(np.arange(len(bridges)), [len(of_frame) for of_frame in bridges]), held.ravel()
+    ] = True
     fine = next(cells for most, cells in _NECKS if bridged.size < most)
     points = np.zeros((len(bridges), len(contacts) * fine[0] * fine[1], 3))
     for frame, present in enumerate(bridged):
@@ -173,9 +218,13 @@ def _necks(
         hidden = at_front_walls(motion, contacts[near], ends, toward)
         width = (present[near] & ~hidden).astype(float)
         necks = necks_of(motion, contacts[near], ends, *fine, width)[0]
-        points[frame].reshape(len(contacts), -1, 3)[near] = necks - (0.0 if path is None else path[frame])
+        points[frame].reshape(len(contacts), -1, 3)[near] = necks - (
+            0.0 if path is None else path[frame]
+        )
     look = {"color": BLUE, "opacity": OPACITY, "flat_shading": True, "name": "bridges"}
-    mesh = k3d.mesh(points[0].astype(np.float32), triangles_of(len(contacts), *fine).astype(np.uint32), **look)
+    mesh = k3d.mesh(
+        points[0].astype(np.float32), triangles_of(len(contacts), *fine).astype(np.uint32), **look
+    )
     mesh.vertices = _series(motion, np.round(points / _GRID) * _GRID)
     return [mesh]
 
@@ -183,7 +232,10 @@ def _necks(
 def _points(motion: Motion, colours: FloatArray) -> Any:
     import k3d
 
-    sizes, look = (2e3 * motion.radius).astype(np.float32), {"shader": "3d", "roughness": 0.5, "name": "beads"}
+    sizes, look = (
+        (2e3 * motion.radius).astype(np.float32),
+        {"shader": "3d", "roughness": 0.5, "name": "beads"},
+    )
     start = np.zeros((len(sizes), 3), dtype=np.float32)
     points = k3d.points(start, point_sizes=sizes, colors=colours.astype(np.uint32), **look)
     coarse = 8.0 * _GRID  # beads are many
@@ -192,7 +244,10 @@ def _points(motion: Motion, colours: FloatArray) -> Any:
 
 
 def _series(motion: Motion, values: FloatArray) -> dict[str, Any]:
-    return {f"{time:.6f}": value for time, value in zip(motion.time, values.astype(np.float32), strict=True)}
+    return {
+        f"{time:.6f}": value
+        for time, value in zip(motion.time, values.astype(np.float32), strict=True)
+    }
 
 
 def _walls(motion: Motion, step: float) -> list[Any]:
@@ -205,14 +260,30 @@ def _walls(motion: Motion, step: float) -> list[Any]:
         if not some:
             continue
         mesh = view.mesh_of(some).triangulate()
-        points = np.asarray(mesh.points - [0.0, 0.0, 2e-3 * level], dtype=np.float32)  # below beads that touch it
-        look = {"color": _FLOOR, "side": "double", "roughness": 1.0, "name": "floor" if level else "wall"}
-        parts.append(k3d.mesh(points, mesh.regular_faces.astype(np.uint32), opacity=1.0 if level else 0.12, **look))
+        points = np.asarray(
+            mesh.points - [0.0, 0.0, 2e-3 * level], dtype=np.float32
+        )  # below beads that touch it
+        look = {
+            "color": _FLOOR,
+            "side": "double",
+            "roughness": 1.0,
+            "name": "floor" if level else "wall",
+        }
+        parts.append(
+            k3d.mesh(
+                points, mesh.regular_faces.astype(np.uint32), opacity=1.0 if level else 0.12, **look
+            )
+        )
     if motion.case.boundary.bare:
         low, high = faces[0].min(axis=0), faces[0].max(axis=0)
         step = max(step, view.round_below(float(np.ptp([low, high])) / _MOST_LINES))
         ends = view.floor_lines(low, high, step).astype(np.float32)
         pairs = np.arange(len(ends), dtype=np.uint32).reshape(-1, 2)
-        look = {"indices_type": "segment", "shader": "simple", "color": _LINES, "name": f"every {step:g} mm"}
+        look = {
+            "indices_type": "segment",
+            "shader": "simple",
+            "color": _LINES,
+            "name": f"every {step:g} mm",
+        }
         parts.append(k3d.lines(ends, pairs, **look))
     return parts

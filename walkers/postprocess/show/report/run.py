@@ -14,7 +14,14 @@ from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.caption import caption
 from walkers.postprocess.measure.motion import read_motion
 from walkers.postprocess.measure.numbers import rows
-from walkers.postprocess.measure.results import BAND_NOTE, Results, has_band, headlines, not_computed, read
+from walkers.postprocess.measure.results import (
+    BAND_NOTE,
+    Results,
+    has_band,
+    headlines,
+    not_computed,
+    read,
+)
 from walkers.postprocess.measure.uncertainty import held_of, held_text
 from walkers.postprocess.show.figures import figures_of
 from walkers.postprocess.show.report.page import LARGEST, NAME, check_report, fill, page_of, svg_of
@@ -55,14 +62,23 @@ def report_run(
         "summary": f"{caption(motion.case)}.",
         "shown": shown_of(motion.case, results, origins),
         "manifest": read_manifest(directory),
-        "figures": {name: svg_of(figure) for name, figure in {**figures_of(results), **figures}.items()},
+        "figures": {
+            name: svg_of(figure) for name, figure in {**figures_of(results), **figures}.items()
+        },
     }
     places, page = 2 * MOST_PLACES, ""
     while not page or (len(page.encode()) >= largest and places > len(motion.radius)):
         places //= 2
         plot, times, captions = player_of(motion, places=places)
         carried = {"player": base64.b64encode(plot.get_binary_snapshot(9)).decode()}
-        body = fill("run.html.j2", run=run, camera=plot.camera, begin=times[0], end=times[1], captions=captions)
+        body = fill(
+            "run.html.j2",
+            run=run,
+            camera=plot.camera,
+            begin=times[0],
+            end=times[1],
+            captions=captions,
+        )
         page = page_of(title, body, carried)
     write_bytes(path, page.encode())
     return path
@@ -72,7 +88,8 @@ def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str,
     """Warnings and rows of a result, what of it is not computed, and parameters of its case with their origins."""
     origins = case.origins if origins is None else origins
     parameters = [
-        vars(source) | {"range": " … ".join(map(text_of, source.range or ())), "origin": source.word}
+        vars(source)
+        | {"range": " … ".join(map(text_of, source.range or ())), "origin": source.word}
         for source in origins
     ]
     banded = has_band(results)
@@ -83,7 +100,9 @@ def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str,
         "band": BAND_NOTE,
         "fixed": held_text(held_of(origins)) if banded else "",
         "guessed": [parameter for parameter in parameters if parameter["origin"] == "guessed"],
-        "uncertain": [parameter for parameter in parameters if parameter["origin"].endswith("uncertain")],
+        "uncertain": [
+            parameter for parameter in parameters if parameter["origin"].endswith("uncertain")
+        ],
         "parameters": parameters,
     }
 
@@ -91,4 +110,6 @@ def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str,
 def result_html(results: Results, origins: Origins = None) -> str:
     """A result as an HTML fragment: table with errors and units, warnings, collapsed parameters."""
     shown = shown_of(case_of(results.directory), results, origins)
-    return fill("result.html.j2", headlines=headlines(results), shown=shown, run=results.directory.name)
+    return fill(
+        "result.html.j2", headlines=headlines(results), shown=shown, run=results.directory.name
+    )
