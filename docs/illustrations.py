@@ -39,7 +39,7 @@ from walkers.calibration.file import load_calibration
 from walkers.calibration.report import write_outcome
 from walkers.errors import InputError, Problem
 from walkers.files import read_json, write_bytes, write_json
-from walkers.inputs.sweep import Sweep, load_sweep
+from walkers.inputs.sweep import SweepDefinition, load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.results import VERSION, modules_of
 from walkers.postprocess.show.drawing import (
@@ -52,7 +52,7 @@ from walkers.postprocess.show.drawing import (
 )
 from walkers.second_engine.lines import as_dict, failures, run_checks
 from walkers.sweeps.climbing import texts_of
-from walkers.sweeps.scheduler import Options
+from walkers.sweeps.scheduler import SweepOptions
 from walkers.templates.deck import CONTENT_VERSION
 
 if TYPE_CHECKING:
@@ -111,7 +111,9 @@ def _illustration(
     return enter
 
 
-def _cases(*names: str, of: Callable[[str], Sweep] = load_sweep) -> Callable[[], Iterable[Case]]:
+def _cases(
+    *names: str, of: Callable[[str], SweepDefinition] = load_sweep
+) -> Callable[[], Iterable[Case]]:
     """The cases of sweeps."""
     return lambda: [case for name in names for case in of(name).cases()]
 
@@ -145,7 +147,7 @@ _picture("pile.png", "pile-small")
 def _of_paper(name: str, *files: str, sweeps: Iterable[str]) -> None:
     @_illustration(name, *files, cases=_cases(*sweeps, of=sweep_of))
     def make(out: Path, docs: Path) -> None:
-        make_figures(out, docs / "figures", Options(), only=[name], formats=("png",))
+        make_figures(out, docs / "figures", SweepOptions(), only=[name], formats=("png",))
 
 
 for _name, _figure in FIGURES.items():
@@ -354,7 +356,7 @@ _CALIBRATED = {
     "calibration", *_CALIBRATED, cases=lambda: load_calibration("ruby").sweep("ruby").cases()
 )
 def _make_calibration(out: Path, docs: Path) -> None:
-    write_outcome(calibrate(load_calibration("ruby"), out, Options()), out / "ruby")
+    write_outcome(calibrate(load_calibration("ruby"), out, SweepOptions()), out / "ruby")
     for file, name in _CALIBRATED.items():
         shutil.copy(out / "ruby" / name, docs / file)
 

@@ -15,7 +15,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from walkers.commands.options import print_lines
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.files import write_bytes
 from walkers.main import main, new_app
 
@@ -51,9 +51,9 @@ def article(to: Annotated[Path, Parameter(name="OUT")], /) -> None:
         The folder.
     """
     if find_spec("sphinx") is None or shutil.which("chromium") is None:
-        raise refused("the article", "needs sphinx and chromium: make paper installs them")
+        raise input_error("the article", "needs sphinx and chromium: make paper installs them")
     if to.exists() and not to.is_dir():
-        raise refused(to, "expected a folder, this is a file")
+        raise input_error(to, "expected a folder, this is a file")
     html = to / "article.html"
     pdf = to / "article.pdf"
     page = _page()

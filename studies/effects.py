@@ -20,7 +20,7 @@ from walkers.inputs.resolving.loads import contact_loads, dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.main import main, new_app
 from walkers.text import aligned
-from walkers.theory.motion import Walker, walk
+from walkers.theory.motion import Walker, predict_motion
 
 COMMAND = "python -m studies.effects"
 app = new_app(COMMAND)
@@ -125,7 +125,7 @@ def _common(edges: FloatArray, apart: float) -> float:
 def acts(
     sliding: tuple[float, float, float], normal: FloatArray, friction: FloatArray, terms: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The effects in the motion (`walkers.theory.motion.walk`), to be compiled."""
+    """The effects in the motion (`walkers.theory.motion.predict_motion`), to be compiled."""
     along = 0.5 * (sliding[0] + sliding[1] - sliding[2])
     spins = (along - sliding[0], along - sliding[1])  # velocities -R dφ/dt
     entraining = (0.5 * (along + spins[0]), 0.5 * (along + spins[1]), 0.5 * (spins[0] - spins[1]))
@@ -168,7 +168,7 @@ def row(effect: Effect) -> dict[str, str]:
         at_rest=walker.at_rest - lost.T,
         resistances=resistances,
     )
-    motion = walk(
+    motion = predict_motion(
         walker,
         [case.excitation.frequency for case in cases],
         [case.excitation.peak_acceleration for case in cases],

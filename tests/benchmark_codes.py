@@ -38,7 +38,7 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.tables.case import Case
 from walkers.physics.capillary import bead_volume
 from walkers.postprocess.measure.dump import BinaryDump
-from walkers.runner.directory import write_deck
+from walkers.runner.run_directory import write_deck
 from walkers.templates.layout import BEAD_COLUMNS
 from walkers.templates.placement import Bead
 

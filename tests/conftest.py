@@ -35,10 +35,10 @@ from walkers.main import main
 from walkers.postprocess.measure.motion import Group, read_motion
 from walkers.postprocess.show import series
 from walkers.runner.binary import Engine
-from walkers.runner.directory import locked, run_place
 from walkers.runner.failures import RunBusy
+from walkers.runner.run_directory import locked, run_place
 from walkers.runs.making import OpenRun, open_locked
-from walkers.sweeps.scheduler import Options, run_sweep
+from walkers.sweeps.scheduler import SweepOptions, run_sweep
 
 # The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, no rolling friction, one walker that starts on the
 # axis in equilibrium.
@@ -243,7 +243,7 @@ def looked_through(once: Callable[[str, Callable[[Path], object]], Path]) -> Pat
         (folder / "base.toml").write_text(to_toml(document(**changes)))
         for name, axes in LOOKED_THROUGH.items():
             sweep = expand({"case": "base.toml", **axes}, source=name, name=name, folder=folder)
-            _, failures = run_sweep(sweep, folder / "runs", Options(2))
+            _, failures = run_sweep(sweep, folder / "runs", SweepOptions(2))
             assert not failures
 
     return once("looked-through", fill) / "runs"

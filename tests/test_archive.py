@@ -21,11 +21,11 @@ from walkers.archive.contents import Contents
 from walkers.archive.writing import write_archive
 from walkers.files import read_json, write_json
 from walkers.inputs.case_building import build_case
-from walkers.runner.directory import leave_out_dumps
 from walkers.runner.manifest import FileChanged, read_manifest
 from walkers.runner.model_sources import model_version
 from walkers.runner.provenance import software
-from walkers.sweeps.table import load
+from walkers.runner.run_directory import leave_out_dumps
+from walkers.sweeps.table import load_table
 
 AUTHOR = ("--author", "Josiah Carberry", "--licence", "CC-BY-4.0")
 RECORD = "archive.json"
@@ -192,12 +192,14 @@ def test_an_archive_of_a_sweep(shared: Path, tmp_path: Path) -> None:
     )
     shutil.unpack_archive(archive, unpacked)
     there = unpacked / "runs" / "angles"
-    before, after = (load(folder).drop(columns="run") for folder in (shared / "angles", there))
+    before, after = (
+        load_table(folder).drop(columns="run") for folder in (shared / "angles", there)
+    )
     assert list(after["status"]) == ["finished"] * 2
     assert before.equals(after)
     places = [unpacked / place for place in pd.read_csv(there / "table.csv")["run"]]
     assert [place.name for place in places] == [
-        Path(place).name for place in load(shared / "angles")["run"]
+        Path(place).name for place in load_table(shared / "angles")["run"]
     ]
     for place, angle in zip(places, ("0 deg", "10 deg"), strict=True):
         assert load_case(place / "base.toml") == build_case(
@@ -560,8 +562,12 @@ def test_the_archive_of_a_draw_says_that_liggghts_cannot_repeat_it(
     uncertain: Path, tmp_path: Path
 ) -> None:
     """It has no tables of forces; the program repeats it."""
-    runs = [Path(run).name for run in load(uncertain / "runs" / "angles")["run"]]
-    draw = uncertain / "runs" / Path(load(uncertain / "runs" / f"{runs[1]}-spread")["run"][0]).name
+    runs = [Path(run).name for run in load_table(uncertain / "runs" / "angles")["run"]]
+    draw = (
+        uncertain
+        / "runs"
+        / Path(load_table(uncertain / "runs" / f"{runs[1]}-spread")["run"][0]).name
+    )
     assert not list(draw.rglob("bridges.txt"))
     archive, unpacked = tmp_path / "draw.zip", tmp_path / "unpacked"
     call("export", str(draw), "--to", "archive", "-o", str(archive), check=True)
@@ -579,7 +585,7 @@ def test_archives_have_the_spread_and_the_accuracy(
     what: str, uncertain: Path, tmp_path: Path
 ) -> None:
     """A colleague sees the same band, error and figures, and the check finds nothing missing."""
-    table = load(uncertain / "runs" / "angles")
+    table = load_table(uncertain / "runs" / "angles")
     runs = [Path(run).name for run in table["run"]]
     packed = runs[0] if what == "a run" else "angles"
     archive, unpacked = tmp_path / "archive.zip", tmp_path / "unpacked"
@@ -592,8 +598,8 @@ def test_archives_have_the_spread_and_the_accuracy(
         before, after = (Run(folder / run).result for folder in (uncertain / "runs", there))
         assert {"velocity_low", "velocity_high", "velocity_draws"} <= after.keys()
         assert after == before
-        assert list(load(there / f"{run}-spread")["status"]) == ["finished"] * len(
-            load(there / f"{run}-spread")
+        assert list(load_table(there / f"{run}-spread")["status"]) == ["finished"] * len(
+            load_table(there / f"{run}-spread")
         )
         call("plot", str(there / f"{run}-spread"), "--to", str(tmp_path / "draws.png"), check=True)
     assert (
@@ -605,4 +611,4 @@ def test_archives_have_the_spread_and_the_accuracy(
     assert re.search(r"velocity along the heading .* band [0-9.]+ to [0-9.]+", told)
     if what == "a sweep":
         columns = ["velocity", "velocity_low", "velocity_high"]
-        assert load(there / "angles")[columns].equals(table[columns])
+        assert load_table(there / "angles")[columns].equals(table[columns])

@@ -24,12 +24,12 @@ from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.gait import postures
 from walkers.postprocess.measure.meetings import collective
 from walkers.postprocess.measure.motion import Group, read_motion
-from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.results import read_results
 from walkers.postprocess.measure.tables import read_table
 from walkers.postprocess.show.figures import figures_of
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import write_deck
 from walkers.runner.launch import launch
+from walkers.runner.run_directory import write_deck
 from walkers.templates.deck import render_deck
 from walkers.templates.placement import place
 from walkers.theory.prediction import motion_of
@@ -359,7 +359,7 @@ def test_walkers_are_as_fast_as_measured(run_directory: Ran, name: str) -> None:
     case = fig1b(**keys) if of_fig1b else load_case(REFERENCE, keys)
     if "drive" in changes:
         case = build_case({**case.document, "drive": changes["drive"]})
-    result = read(run_directory(case))
+    result = read_results(run_directory(case))
     found = {number: 1e3 * result[number] for number in expected}
     assert found == pytest.approx(expected, rel=0.02, abs=0.01)
 
@@ -519,12 +519,14 @@ def test_a_dimer_on_the_axis_climbs_if_friction_suffices(
     run_directory: Ran, friction: float
 ) -> None:
     """With the large bead below it falls, as a symmetric one does."""
-    velocity = read(run_directory(on_a_wall(friction)))["velocity"]
+    velocity = read_results(run_directory(on_a_wall(friction)))["velocity"]
     assert velocity == pytest.approx(FRICTIONS[friction], rel=0.03)
     assert float(motion_of(on_a_wall(friction)).velocity[0]) == pytest.approx(velocity, rel=0.12)
-    assert read(run_directory(on_a_wall(friction, facing="left")))["axial_left_facing"] < -5e-3
     assert (
-        read(run_directory(on_a_wall(friction, radii=["0.42625 mm", "0.42625 mm"])))[
+        read_results(run_directory(on_a_wall(friction, facing="left")))["axial_left_facing"] < -5e-3
+    )
+    assert (
+        read_results(run_directory(on_a_wall(friction, radii=["0.42625 mm", "0.42625 mm"])))[
             "axial_velocity"
         ]
         < -1e-3
@@ -539,7 +541,7 @@ def test_the_shipped_climber_comes_upright_and_its_posture_is_that_of_the_whole_
     upright = run_directory(
         build_case({**read_toml(shipped("case")["climber"]), "run": run}, name="climber")
     )
-    result, group = read(upright), read_motion(upright).groups[0]
+    result, group = read_results(upright), read_motion(upright).groups[0]
     assert np.degrees(read_table(upright, "walkers")["start_angle"].abs().max()) > 9.0
     assert result["upright"] == result["climbing"] == result["walkers"] == 6
     assert result["velocity"] == pytest.approx(2.67e-3, rel=0.03)

@@ -16,7 +16,7 @@ from walkers.errors import InputError
 from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.config_table import changed
 from walkers.inputs.tables.case import Case, CaseFile
-from walkers.runner.directory import FIRST_SEGMENT
+from walkers.runner.run_directory import FIRST_SEGMENT
 from walkers.runs.by_hand import take_in, write_folder
 from walkers.runs.case_text import differing, flattened
 

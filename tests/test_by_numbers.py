@@ -34,7 +34,7 @@ from walkers.postprocess.show.scene import Scene, rotations_at, turned_in
 from walkers.runner.cost import predicted_overhead
 from walkers.runner.manifest import iso_time
 from walkers.runs.making import progress_in
-from walkers.runs.preview import describe, summarise
+from walkers.runs.preview import preview_text, summarise
 from walkers.templates.deck import Segment, compose, plan_of, render_deck
 from walkers.templates.placement import place
 
@@ -112,7 +112,9 @@ def test_a_phase_of_a_waveform_is_an_earlier_begin_of_the_whole() -> None:
 
     plain = Harmonic(axis="x", frequency=frequency, peak_acceleration=10.0)
     earlier = acceleration(plain, time + phase / (2.0 * pi * frequency))
-    np.testing.assert_allclose(acceleration(plain.but(phase=phase), time), earlier, atol=1e-9)
+    np.testing.assert_allclose(
+        acceleration(plain.with_values(phase=phase), time), earlier, atol=1e-9
+    )
     assert np.abs(earlier).max() > 9.0
 
 
@@ -184,7 +186,7 @@ def test_a_deck_of_several_cases_is_watched_with_the_highest_of_their_limits() -
 def test_what_show_prints_of_a_case_is_in_its_units() -> None:
     """Beads of 0.3 and 0.2 mm, 1 % of liquid, 4 g at 80 Hz: masses, volumes, forces and the amplitude by hand."""
     case, omega, volume = make_case(), 2.0 * pi * 80.0, 4.0 / 3.0 * pi * (LARGE**3 + SMALL**3)
-    text = describe(summarise(case))
+    text = preview_text(summarise(case))
     assert (
         f"1 small and 1 large, {1e6 * DENSITY * volume:.4g} mg, {1e9 * volume:.4g} µL with " in text
     )
@@ -203,7 +205,7 @@ def test_what_show_prints_of_a_case_is_in_its_units() -> None:
     )  # half of the bead's liquid
     assert f" {1e6 * bridge_at_rest(case, LARGE, inf).rupture:.3g} µm " in wall
     assert wall.endswith(f" {1e9 * contact_loads(case)[0].overlap:.4g} nm")
-    pile = describe(summarise(case_of(**PILE)))
+    pile = preview_text(summarise(case_of(**PILE)))
     for shown, share in (
         (text, 0.4),
         (pile, 0.2),

@@ -29,14 +29,14 @@ from walkers.calibration.observations import (
     numbers_in,
     numbers_of,
 )
-from walkers.calibration.report import draw_facts, record_of, summary
+from walkers.calibration.report import calibration_record, calibration_summary, draw_facts
 from walkers.errors import InputError
 from walkers.inputs.axes import unit_cube
 from walkers.inputs.reading import load_case, shipped
 from walkers.postprocess.measure.tables import read_columns, write_table
-from walkers.runner.directory import recomputed
-from walkers.sweeps.scheduler import Options, run_sweep
-from walkers.sweeps.table import load
+from walkers.runner.run_directory import recomputed
+from walkers.sweeps.scheduler import SweepOptions, run_sweep
+from walkers.sweeps.table import load_table
 from walkers.text import rendered
 
 # --- facts ------------------------------------------------------------------------------------------------------------
@@ -278,18 +278,18 @@ def small(folder: Path, **changes: Any) -> Calibration:
 
 
 def numbers(
-    found: Calibration, values: list[float], out: Path, options: Options
+    found: Calibration, values: list[float], out: Path, options: SweepOptions
 ) -> dict[str, dict[str, float]]:
     """Quantities of the experiments at a parameter set."""
     record, _ = run_sweep(found.sweep("one", np.array([values])), out, options)
-    return dict(zip(found.experiments, numbers_in(load(record.directory)), strict=True))
+    return dict(zip(found.experiments, numbers_in(load_table(record.directory)), strict=True))
 
 
 @pytest.mark.slow
 def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: Path) -> None:
     """Within a quarter; the second time nothing is run."""
     out, to = tmp_path / "runs", tmp_path / "runs" / "reduced"
-    seen = numbers(small(tmp_path), list(TRUE.values()), out, Options(2))
+    seen = numbers(small(tmp_path), list(TRUE.values()), out, SweepOptions(2))
     document = reduced(
         {name: one["velocity"] for name, one in seen.items()}, seen["strong"]["slip_1"]
     )
@@ -299,7 +299,7 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     file = tmp_path / "reduced.toml"
     file.write_text(to_toml(document))
     told = call("calibrate", str(file), "--out", str(out), check=True).stdout
-    summary, names = told.rpartition("\n\n")[0], told.splitlines()[-5:]
+    calibration_summary, names = told.rpartition("\n\n")[0], told.splitlines()[-5:]
     assert [Path(line).name for line in names] == [
         *("posterior.parquet", "calibration.json", "calibration.md", "best.toml", "predictions.png")
     ]
@@ -313,9 +313,12 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
         assert [middle, said["sets"][PROPOSED[0]][name]] == pytest.approx([true, true], rel=0.25), (
             name
         )
-        assert f"{middle:.3g} ({low:.3g} to {high:.3g})" in summary
+        assert f"{middle:.3g} ({low:.3g} to {high:.3g})" in calibration_summary
     assert said["agree"]["guess"] < said["agree"][PROPOSED[0]]
-    assert f"{said['agree']['guess']} of 5 measured facts agree within their deviation" in summary
+    assert (
+        f"{said['agree']['guess']} of 5 measured facts agree within their deviation"
+        in calibration_summary
+    )
     best, values = load_case(to / "best.toml"), said["sets"][PROPOSED[0]]
     assert best.contact.friction.bead_wall == pytest.approx(values["friction"], rel=1e-3)
     for key, name in (
@@ -333,9 +336,9 @@ def test_known_parameters_are_found_from_what_the_engine_made_of_them(tmp_path: 
     assert len([*out.glob("*/segments/*/beads.bin")]) == len(
         seen
     )  # of the runs that the calibration did not make
-    again = calibrate(load_calibration(file), out, Options(2))
+    again = calibrate(load_calibration(file), out, SweepOptions(2))
     assert {path.name: path.stat().st_mtime_ns for path in out.glob("*/manifest.json")} == runs
-    assert json.loads(json.dumps(record_of(again))) == said
+    assert json.loads(json.dumps(calibration_record(again))) == said
     assert spoilt(draw_facts(again)) == []
 
 
@@ -347,8 +350,8 @@ def test_a_bead_that_cannot_slide_rolls_and_one_without_friction_is_dragged(tmp_
         observations=[LONE],
         design={},
     )
-    rough = numbers(found, [0.2, 0.5], tmp_path / "runs", Options(2))["slow"]
-    smooth = numbers(found, [0.06, 2.0], tmp_path / "runs", Options(2))["slow"]
+    rough = numbers(found, [0.2, 0.5], tmp_path / "runs", SweepOptions(2))["slow"]
+    smooth = numbers(found, [0.06, 2.0], tmp_path / "runs", SweepOptions(2))["slow"]
     assert rough["slip_1"] < 0.02
     assert smooth["slip_1"] > 5.0 * rough["slip_1"]
     assert rough["velocity"] == pytest.approx(rough["rotation_1"] + rough["sliding_1"], rel=0.02)
@@ -408,10 +411,10 @@ def test_the_record_has_quantiles_and_agreement_of_a_known_outcome(
     rows = known(TRUTH) + 0.2 * np.array([[1.5, -0.9], [0.5, np.nan], [0.9, 0.9]])
     calibration = small(tmp_path)
     parameters = calibration.file.parameters
-    parameters["drag"] = parameters["friction"].but(range=(0.4, 10.0))
-    design = calibration.file.design.but(held_out=["b"])
+    parameters["drag"] = parameters["friction"].with_values(range=(0.4, 10.0))
+    design = calibration.file.design.with_values(held_out=["b"])
     calibration = replace(
-        calibration, file=calibration.file.but(observations=[one, other], design=design)
+        calibration, file=calibration.file.with_values(observations=[one, other], design=design)
     )
     without = Posterior(np.array([[0.9, 0.5]]), np.zeros(1), 1)  # what is held out
     names = ("guess", *PROPOSED[::2])
@@ -420,7 +423,7 @@ def test_the_record_has_quantiles_and_agreement_of_a_known_outcome(
         zip(names, rows, strict=True),
     )
     unit = {name: np.array(row) for name, row in sets}
-    found = record_of(
+    found = calibration_record(
         Outcome(
             calibration,
             unit,
@@ -454,7 +457,7 @@ def test_the_record_has_quantiles_and_agreement_of_a_known_outcome(
     predicted = [row["predicted"] for row in found["observations"]]
     assert predicted == [None, pytest.approx([1e3 * known(without.points)[0, 1]] * 3, rel=0.02)]
     for agree, doubted in (([0, 1], False), ([0, 0], True)):  # of two facts
-        said = summary({**found, "agree": dict(zip(names, agree, strict=False))})
+        said = calibration_summary({**found, "agree": dict(zip(names, agree, strict=False))})
         assert ("no set agrees with half" in said) == doubted
     assert "| drag/friction |" in rendered("walkers.calibration", "report.md.j2", found=found)
 
@@ -551,5 +554,5 @@ def test_calibrations_that_make_no_sense_are_refused_before_anything_is_written(
         ({"case": "pile-ci", "set": {}, "experiments": shaken}, "expected a case of dimers"),
     ):
         with pytest.raises(InputError, match=told):
-            calibrate(small(tmp_path, **changes), tmp_path / "runs", Options(1))
+            calibrate(small(tmp_path, **changes), tmp_path / "runs", SweepOptions(1))
     assert not (tmp_path / "runs").exists()

@@ -39,9 +39,9 @@ from walkers.runner.manifest import read_manifest
 from walkers.runner.model_sources import SOURCES
 from walkers.second_engine import kernels
 from walkers.second_engine.audit import CHECKS, record, run_audit
-from walkers.second_engine.crosscheck import compare, full_cases, shortened, simulate
+from walkers.second_engine.crosscheck import cross_check, full_cases, simulate, with_cycles
 from walkers.second_engine.engine import TERMS, SecondEngine
-from walkers.second_engine.lines import Line, Verdict, as_text, failures
+from walkers.second_engine.lines import Line, Verdict, failures, lines_text
 from walkers.second_engine.scenes import (
     DEEP,
     DRY,
@@ -53,8 +53,8 @@ from walkers.second_engine.scenes import (
     over,
     pair,
     prescribed,
+    scene_of,
     second_engine,
-    standing,
 )
 from walkers.templates.deck import Plan, compose
 from walkers.templates.layout import WALL_BRIDGES
@@ -77,7 +77,9 @@ def one_bead(
     case: Case, place: Vector, velocity: Vector = STILL, spin: Vector = STILL, wall: Wall = BOTTOM
 ) -> SecondEngine:
     """A bead without bridges at a wall."""
-    case = case.put("contact.youngs_modulus", 5e7).put("contact.poissons_ratio", 0.3)
+    case = case.with_value_at("contact.youngs_modulus", 5e7).with_value_at(
+        "contact.poissons_ratio", 0.3
+    )
     start = np.array([[*place, *velocity, *spin]])
     return SecondEngine(case, np.array([RADIUS]), start, walls=[wall], without=NO_BRIDGES)
 
@@ -95,7 +97,7 @@ def pile(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def fig1b(run_directory: Callable[..., Path]) -> Motion:
     """Two walkers of Fig. 1b for nine cycles, by LIGGGHTS."""
-    return read_motion(run_directory(shortened(load_case("fig1b", {"dimers.replicates": 2}), 9)))
+    return read_motion(run_directory(with_cycles(load_case("fig1b", {"dimers.replicates": 2}), 9)))
 
 
 @pytest.fixture
@@ -129,7 +131,7 @@ def test_a_bead_rolls_to_rest_and_swings_in_a_cylinder() -> None:
 def test_bridges_are_the_law_between_its_knots() -> None:
     """Pull and resistances, at gaps that are none of the splines', to 1e-8."""
     case = full_case({})
-    bridges = second_engine(case, standing([over(FLOOR, 0.0, RADIUS)])).constants.bridges
+    bridges = second_engine(case, scene_of([over(FLOOR, 0.0, RADIUS)])).constants.bridges
     surfaces = Surfaces.of(RADIUS, inf, case.liquid.of_bridges, case.contact.roughness)
     curve = by_name(case.liquid.law)(surfaces)
     for gap in np.linspace(0.0, 0.999 * curve.rupture, 777):
@@ -141,7 +143,7 @@ def test_bridges_are_the_law_between_its_knots() -> None:
 
 def test_the_forces_of_a_pair_conserve_momentum_and_angular_momentum() -> None:
     """With friction, rolling friction, and all resistances of a bridge."""
-    engine = second_engine(full_case({}), standing(pair(-DEEP, 0.043, (0.02, -0.011, 0.005))))
+    engine = second_engine(full_case({}), scene_of(pair(-DEEP, 0.043, (0.02, -0.011, 0.005))))
     for _ in range(300):
         engine.run(1, 1)
         force, torque, places = engine.state.force, engine.state.torque, engine.state.position
@@ -152,7 +154,7 @@ def test_the_forces_of_a_pair_conserve_momentum_and_angular_momentum() -> None:
 
 def test_fig1b_is_one_motion_in_both_engines(fig1b: Motion) -> None:
     """Velocity, rotation and sliding agree to 1e-6, and so do places: its contacts stay closed."""
-    velocity, *_, together, farthest = lines = compare([fig1b])
+    velocity, *_, together, farthest = lines = cross_check([fig1b])
     assert failures(lines) == []
     assert velocity.measured == pytest.approx(velocity.expected, rel=1e-6)
     assert together.measured == together.expected
@@ -162,7 +164,7 @@ def test_fig1b_is_one_motion_in_both_engines(fig1b: Motion) -> None:
 @pytest.mark.parametrize("term", TERMS)
 def test_without_a_term_it_disagrees(fig1b: Motion, term: str) -> None:
     """So that agreement says something of that term."""
-    velocity, *_, together, _ = lines = compare([fig1b], [term])
+    velocity, *_, together, _ = lines = cross_check([fig1b], [term])
     assert failures(lines) or together.measured < together.expected
     assert velocity.failed or term in ("damping", "gravity")  # which change it by 2 µm/s
 
@@ -173,12 +175,12 @@ def test_other_kinds_of_cases_agree(name: str, tmp_path: Path) -> None:
 
     To 0.1 nm without rolling friction, which amplifies rounding.
     """
-    case = shortened(full_cases()[name], 3)
-    lines = compare([run(case, tmp_path).motion])
+    case = with_cycles(full_cases()[name], 3)
+    lines = cross_check([run(case, tmp_path).motion])
     assert failures(lines) == []
     assert lines[-1].measured < 10.0
-    free = case.put("contact.rolling_friction", 0.0)
-    assert compare([run(free, tmp_path).motion])[-1].measured < 1e-4
+    free = case.with_value_at("contact.rolling_friction", 0.0)
+    assert cross_check([run(free, tmp_path).motion])[-1].measured < 1e-4
 
 
 def test_piles_agree_until_they_are_chaotic_and_through_a_restart(
@@ -193,7 +195,7 @@ def test_piles_agree_until_they_are_chaotic_and_through_a_restart(
         measured[f"start {seed + number}: cycles of the same motion"] >= 1.0 for number in range(2)
     )
     assert [*measured][:3:2] == ["height of the beads", "touching pairs per bead"]
-    first = run(shortened(build_case(pile, name="pile"), 3), Path("runs"))
+    first = run(with_cycles(build_case(pile, name="pile"), 3), Path("runs"))
     parts = {
         name: getattr(first.motion, name)[:-1]
         for name in ("time", "position", "velocity", "spin", "frames")
@@ -235,7 +237,7 @@ def test_walls_are_as_far_as_the_boundary_says(bench: Bench) -> None:
         over(leaning, -1e-6, RADIUS),
         Bead(0, (out * cos(turn), out * sin(turn), 4e-3), RADIUS),
     ]
-    rows, places = _rows(bench, prescribed(bench_case({}), standing(beads, [leaning, hollow]), 3))
+    rows, places = _rows(bench, prescribed(bench_case({}), scene_of(beads, [leaning, hollow]), 3))
     assert rows[:, WALL_BRIDGES.index("wall")].tolist() == [0, 1]
     for wall, row, place in zip((leaning, hollow), rows, places, strict=True):
         distance, normal = float(wall.distances(place)), wall.normals(place)
@@ -257,7 +259,7 @@ def test_a_wall_that_moves_meets_beads_that_do_not(bench: Bench) -> None:
     peak = {"drive.peak_acceleration": f"{1e-3 * (2.0 * pi * 80.0) ** 2!r} m/s^2"}
     case = bench_case({**DRY, **up, **peak})
     beads = [over(FLOOR, 1e-3 - 1e-6, RADIUS), over(FLOOR, 1e-3 + 1e-6, RADIUS, x=1e-3)]
-    (row,), _ = _rows(bench, prescribed(case, standing(beads), case.run.steps_per_cycle // 4))
+    (row,), _ = _rows(bench, prescribed(case, scene_of(beads), case.run.steps_per_cycle // 4))
     told = dict(zip(WALL_BRIDGES, row.tolist(), strict=True))
     assert (told["id"], told["overlap"]) == pytest.approx((1, 1e-6), rel=1e-5)
 
@@ -276,7 +278,7 @@ REFUSED_WALLS = {
 
 @pytest.mark.parametrize("command", REFUSED_WALLS)
 def test_commands_that_are_refused(bench: Bench, command: str) -> None:
-    deck = compose(prescribed(bench_case({}), standing([over(FLOOR, 0.0, RADIUS)]), 3))
+    deck = compose(prescribed(bench_case({}), scene_of([over(FLOOR, 0.0, RADIUS)]), 3))
     lines = deck.text.replace("&\n", " ").splitlines()
     changed = [
         f"fix walls all wall/bridge {command}" if "wall/bridge" in line else line for line in lines
@@ -287,10 +289,10 @@ def test_commands_that_are_refused(bench: Bench, command: str) -> None:
 
 def test_a_dry_contact_with_a_wall_begins_without_friction(bench: Bench) -> None:
     """Sheared, lifted and put down again, where films are empty: the spring of the first contact has ended."""
-    case = bench_case({"liquid.law": "willett", "contact.friction.bead_wall": 0.3}).put(
+    case = bench_case({"liquid.law": "willett", "contact.friction.bead_wall": 0.3}).with_value_at(
         "liquid.conserved", True
     )
-    deck = compose(prescribed(case, standing([over(FLOOR, -1e-6, RADIUS, spin=STILL)]), 60))
+    deck = compose(prescribed(case, scene_of([over(FLOOR, -1e-6, RADIUS, spin=STILL)]), 60))
     empty = deck.text.replace("scalar yes yes no 1.0", "scalar yes yes no 0.0")
     before, _, after = empty.partition("\nrun ")
     ways = ("1e-2 0 0", "0 0 2.0", "0 0 -2.0")  # m/s, each for 20 steps
@@ -351,7 +353,7 @@ def test_the_installed_engine_passes() -> None:
     assert [*dict.fromkeys(line.check for line in lines)] == [*CHECKS]
     assert len(lines) > 40
     assert version == "LIGGGHTS-PUBLIC 3.8.0"
-    assert all(line.quantity in as_text(lines) for line in lines)
+    assert all(line.quantity in lines_text(lines) for line in lines)
 
 
 @pytest.mark.slow

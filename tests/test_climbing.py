@@ -21,12 +21,12 @@ from tests.conftest import call, to_toml
 from walkers.inputs.reading import shipped
 from walkers.sweeps.climbing import (
     PARTS,
+    climb_summary,
+    climbing_table,
     climbs_figure,
     conditions_in,
     leaders,
-    summary,
     survival,
-    table_of,
     texts_of,
 )
 
@@ -75,19 +75,19 @@ PILES = pd.DataFrame({"beads": BEADS, "large": LARGE, "driven": [LENGTH] * 4})
 def drawn(
     begins: Any, lengths: Any, takes: float, within: float | None = None, **columns: Any
 ) -> dict[str, Any]:
-    """`summary` of runs whose first climbs began so and take so long to gain enough, where the run shows that, s."""
+    """`climb_summary` of runs whose first climbs began so and take so long to gain enough, where the run shows that, s."""
     rows = pd.DataFrame(
         [CLIMB | {"size": 2, "leader": 0, "wall_names": "+x"}] * len(begins)
     ).assign(**columns)
     rows = rows.assign(pile=range(len(begins)), onset=begins, qualified=np.add(begins, takes))
     piles = pd.DataFrame({"beads": BEADS, "large": LARGE, "driven": lengths})
-    return summary(piles, rows[rows["qualified"] <= lengths], within)
+    return climb_summary(piles, rows[rows["qualified"] <= lengths], within)
 
 
 def test_a_rate_has_the_exact_interval_of_a_poisson_distribution() -> None:
     """Each end leaves 2.5 %: so many climbs or more at the lower end, so many or fewer at the upper one."""
-    found = summary(PILES, CLIMBS)
-    rows = table_of([{**found, "condition": "few"}]).set_index("where")
+    found = climb_summary(PILES, CLIMBS)
+    rows = climbing_table([{**found, "condition": "few"}]).set_index("where")
     for where, climbs in {"all": 3, "plain walls": 2, "corners": 1}.items():
         row = rows.loc[where]
         assert (row["condition"], row["runs"], row["climbs"]) == ("few", 4, climbs)
@@ -109,13 +109,13 @@ def test_a_rate_has_the_exact_interval_of_a_poisson_distribution() -> None:
         assert (poisson.sf(climbs - 1, low), poisson.cdf(climbs, high)) == pytest.approx(
             (0.025, 0.025)
         ), part
-    none = summary(PILES[2:], CLIMBS[:0])
+    none = climb_summary(PILES[2:], CLIMBS[:0])
     assert (none["rate"], none["dispersion"]) == (0.0, None)
     assert np.array(none["rate_interval"]) * 20.0 == pytest.approx(GARWOOD[0], abs=6e-5)
 
 
 def test_times_dispersion_and_probability_of_three_climbs_also_of_runs_cut() -> None:
-    found = summary(PILES, CLIMBS)
+    found = climb_summary(PILES, CLIMBS)
     expected = {
         "within": LENGTH,
         "times": [2.0, 4.0],
@@ -132,7 +132,7 @@ def test_times_dispersion_and_probability_of_three_climbs_also_of_runs_cut() -> 
     # Counts 2, 1, 0, 0: mean 3/4, variance (25/16 + 1/16 + 18/16)/3 = 11/12.
     assert found["dispersion"] == pytest.approx(11.0 / 12.0 / 0.75)
     # Runs cut at 5 s: counts 1, 1, 0, 0, mean 1/2, variance (4 × 1/4)/3.
-    cut = summary(PILES, CLIMBS, within=5.0)
+    cut = climb_summary(PILES, CLIMBS, within=5.0)
     assert (cut["within"], cut["seconds"], cut["climbs"], cut["climbed"], cut["rate"]) == (
         5.0,
         20.0,
@@ -196,7 +196,7 @@ def test_as_many_large_leaders_by_chance_are_enumerated() -> None:
 
 
 def test_piles_that_were_not_driven_have_no_rate() -> None:
-    found = summary(PILES.assign(driven=0.0), CLIMBS[:0])
+    found = climb_summary(PILES.assign(driven=0.0), CLIMBS[:0])
     assert (found["seconds"], found["rate"], found["rate_interval"]) == (0.0, None, None)
     assert texts_of({**found, "condition": ""})["rate"] == "–"
 
@@ -206,19 +206,19 @@ def test_runs_whose_lengths_differ_by_more_than_a_tenth_have_no_dispersion(
     shortest: float, has_dispersion: bool
 ) -> None:
     """Numbers of climbs of runs of different lengths vary even if climbs are as frequent."""
-    found = summary(PILES.assign(driven=[10.0, 10.0, 10.0, shortest]), CLIMBS)
+    found = climb_summary(PILES.assign(driven=[10.0, 10.0, 10.0, shortest]), CLIMBS)
     assert (found["dispersion"] is not None) == has_dispersion
 
 
 def test_chances_are_printed_with_the_share_of_large_beads() -> None:
     """Of 4 large beads in 20; a probability cannot be told below two of the 10,000 draws."""
-    found = summary(PILES, CLIMBS)
+    found = climb_summary(PILES, CLIMBS)
     printed = texts_of({**found, "condition": ""})
     assert printed["large beads (%)"] == "20"
     assert float(printed["p by chance"]) == pytest.approx(found["p_among_beads"], rel=0.05)
     rare = texts_of({**found, "condition": "", "p_among_beads": 1e-4})
     assert rare["p by chance"] == "0.0002"
-    none = texts_of({**summary(PILES, CLIMBS[:0]), "condition": ""})
+    none = texts_of({**climb_summary(PILES, CLIMBS[:0]), "condition": ""})
     absent = (
         "p by chance",
         "dispersion",
@@ -235,7 +235,7 @@ def test_chances_are_printed_with_the_share_of_large_beads() -> None:
 def test_speeds_of_two_climbs_are_told_by_their_range_and_median() -> None:
     """2 and 4 mm/s, and one that was not measured."""
     climbs = CLIMBS.assign(speed=[np.nan, 2e-3, 4e-3], height=[5e-3, 10e-3, 12e-3])
-    printed = texts_of({**summary(PILES, climbs), "condition": ""})
+    printed = texts_of({**climb_summary(PILES, climbs), "condition": ""})
     assert (printed["speed (mm/s)"], printed["median speed (mm/s)"]) == ("2 to 4", "3")
     assert printed["height (mm)"] == "5 to 12"
 
@@ -306,7 +306,11 @@ def test_the_parts_of_climbs_are_judged_at_the_time_of_the_whole() -> None:
 
 def _found(condition: str, climbs: pd.DataFrame = CLIMBS) -> dict[str, Any]:
     """The statistics of a condition as `walkers.climb` returns them."""
-    return {**summary(PILES, climbs), "condition": condition, "each": climbs.to_dict("records")}
+    return {
+        **climb_summary(PILES, climbs),
+        "condition": condition,
+        "each": climbs.to_dict("records"),
+    }
 
 
 def _points(axes: Axes) -> dict[Any, list[Any]]:

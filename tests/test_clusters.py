@@ -15,7 +15,7 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.tables.shapes.walls import Flat
 from walkers.postprocess.measure import clusters
 from walkers.postprocess.measure.clusters import (
-    Beads,
+    PileBeads,
     Track,
     _walls_apart,
     assembly_of,
@@ -28,7 +28,7 @@ from walkers.postprocess.measure.clusters import (
 from walkers.postprocess.measure.motion import Bridges
 from walkers.postprocess.measure.piles import segregation
 from walkers.postprocess.measure.tables import Columns
-from walkers.sweeps.climbing import summary
+from walkers.sweeps.climbing import climb_summary
 
 BULK = list(range(20))
 TIME = np.arange(0.0, 4.0, 0.02)
@@ -80,7 +80,7 @@ def seen(
         floor = floor_of(names)
         bulks.append(bulk_of(labels, bridges, floor=floor))
         held.append(list(clusters.held_clusters(labels, bridges, bulks[-1], floor)))
-    beads = Beads(TIME, height, np.arange(24) == 20, np.zeros(FRAMES), bulks, 0, names)
+    beads = PileBeads(TIME, height, np.arange(24) == 20, np.zeros(FRAMES), bulks, 0, names)
     tracks = clusters.follow(TIME, held)
     table = climbs_of(tracks, beads)
     events = [
@@ -387,7 +387,7 @@ def test_a_climb_is_in_a_corner_if_two_walls_hold_it(
     scene = seen(UP, walls=lambda frame: held, names=names)
     assert scene.table["wall_names"].tolist() == [", ".join(names[wall] for wall in walls)]
     piles = pd.DataFrame({"beads": [24], "large": [1], "driven": [TIME[-1]]})
-    found = summary(piles, pd.DataFrame(scene.table).assign(pile=0))
+    found = climb_summary(piles, pd.DataFrame(scene.table).assign(pile=0))
     expected = {"on_plain_walls": 0, "in_corners": 0, where: 1}
     assert {part: found[part]["climbs"] for part in expected} == expected
 
@@ -437,7 +437,7 @@ def test_walls_that_turn_little_are_no_corner(turn: float, walls: int) -> None:
         Flat((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
         Flat((0.0, 0.0, 0.0), (np.cos(angle), np.sin(angle), 0.0)),
     ]
-    beads = Beads(
+    beads = PileBeads(
         TIME,
         np.zeros((FRAMES, 24)),
         np.arange(24) == 20,

@@ -44,13 +44,13 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.dump import BinaryDump, DumpError, local_frames
 from walkers.postprocess.measure.motion import read_motion
-from walkers.postprocess.measure.results import measure, read
+from walkers.postprocess.measure.results import measure, read_results
 from walkers.postprocess.show.paraview import write_vtk
 from walkers.postprocess.show.report.run import result_html
-from walkers.runner.directory import CASE_NAME, FIRST_SEGMENT, case_of, locked, recomputed
 from walkers.runner.failures import DiskFull, RunBusy
 from walkers.runner.launch import launch
-from walkers.sweeps.table import load as load_table
+from walkers.runner.run_directory import CASE_NAME, FIRST_SEGMENT, case_of, locked, recomputed
+from walkers.sweeps.table import load_table
 from walkers.templates.deck import Deck, render_deck
 from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
 from walkers.text import environment
@@ -220,7 +220,7 @@ def test_a_sweep_goes_on_without_a_damaged_run_and_says_which(name: str, short_c
 def test_a_result_whose_making_was_killed_is_made_anew(parts: Path) -> None:
     """Between the table that is new and the manifest that does not yet say so."""
     run, names = parts, ["result.json", "walkers.parquet", "trajectory.parquet"]
-    right = read(run).as_dict()
+    right = read_results(run).as_dict()
     with suppress(KeyboardInterrupt), recomputed(run, names):
         edited("result.json", lambda result: result["numbers"].update(velocity=99.0))(run)
         raise KeyboardInterrupt
@@ -526,14 +526,14 @@ def test_a_reader_may_have_had_enough(command: str, short_case: Path) -> None:
     done = subprocess.run(script, capture_output=True, text=True, check=False)
     assert (done.returncode, re.search("Traceback|BrokenPipe", done.stderr)) == (0, None), done
     if command != "--help":
-        assert read(next(Path("runs").glob("short-*")))["velocity"] > 0.0
+        assert read_results(next(Path("runs").glob("short-*")))["velocity"] > 0.0
 
 
 def test_a_closed_output_is_no_error(short_case: Path) -> None:
     script = f"exec {PROGRAM} run short.toml <&- >&- 2>&-"
     done = subprocess.run(["bash", "-c", script], check=False)
     assert done.returncode == 0
-    assert read(next(Path("runs").glob("short-*")))["velocity"] > 0.0
+    assert read_results(next(Path("runs").glob("short-*")))["velocity"] > 0.0
 
 
 @pytest.mark.parametrize(
@@ -563,7 +563,7 @@ def test_what_is_no_file_to_read_is_refused_at_once(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected a file of at most 16 MB"):
         read_toml(tmp_path / "large.toml")
     (tmp_path / "windows.toml").write_text(to_toml(document()), encoding="utf-8-sig")
-    assert load_case(tmp_path / "windows.toml") == make_case().but(name="windows")
+    assert load_case(tmp_path / "windows.toml") == make_case().with_values(name="windows")
 
 
 HOSTILE: dict[str, str] = {
@@ -581,8 +581,12 @@ HOSTILE: dict[str, str] = {
 
 def _with_texts(case: Case, text: str) -> Case:
     """The case as somebody could hand it over: each text of it another."""
-    named = case.put("beads.material", text).put("liquid.name", text).put("boundary.material", text)
-    return named.but(name=text, title=text)
+    named = (
+        case.with_value_at("beads.material", text)
+        .with_value_at("liquid.name", text)
+        .with_value_at("boundary.material", text)
+    )
+    return named.with_values(name=text, title=text)
 
 
 Stranger = Callable[[str], Path]
@@ -617,7 +621,7 @@ def _paraview(text: str, stranger: Stranger, folder: Path) -> object:
 
 def _page(text: str, stranger: Stranger, folder: Path) -> object:
     """Tags: no text may add one."""
-    return re.findall(r"<!?[/\w-]+", result_html(read(stranger(text))))
+    return re.findall(r"<!?[/\w-]+", result_html(read_results(stranger(text))))
 
 
 def _markdown(text: str, stranger: Stranger, folder: Path) -> object:
@@ -679,7 +683,7 @@ def test_odd_paths_are_paths_without_a_site_file_and_are_refused_with_one(
     for attempt in (
         lambda: run_case("short.toml", in_folder / NO_UTF8),
         lambda: load_case(f"{NO_UTF8}.toml"),
-        lambda: run_case(load_case("short.toml").but(name=NO_UTF8), in_folder),
+        lambda: run_case(load_case("short.toml").with_values(name=NO_UTF8), in_folder),
     ):
         with pytest.raises(InputError, match=r"x\\xff.*: expected UTF-8 text"):
             attempt()

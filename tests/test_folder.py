@@ -34,15 +34,15 @@ from walkers.inputs.case_building import changed_case
 from walkers.inputs.reading import shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.uncertainty import ACCURACY_NAME, SPREAD_NAME, spread_of
-from walkers.runner.directory import case_of, locked
 from walkers.runner.manifest import MANIFEST_NAME, checksums
+from walkers.runner.run_directory import case_of, locked
 from walkers.runs.case_text import readable
 from walkers.runs.comparison import Side, compare_runs
 from walkers.runs.listing import bytes_text, weigh
 from walkers.runs.removal import remove, unfinished_in
-from walkers.sweeps.record import read_record
+from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.removal import named_in
-from walkers.sweeps.scheduler import Options, plan_sweep
+from walkers.sweeps.scheduler import SweepOptions, plan_sweep
 
 
 @pytest.fixture
@@ -558,9 +558,9 @@ def test_a_large_sweep_says_how_far_it_is_before_it_runs(
 ) -> None:
     """Here of twelve points, each of which is told."""
     monkeypatch.setattr("walkers.sweeps.scheduler._RESOLVED_AT_ONCE", 1)
-    sweep, told = read_record(out / "three").sweep, list[str]()
+    sweep, told = read_sweep_record(out / "three").sweep, list[str]()
     plan = plan_sweep(
-        sweep, out, Options(1), on_progress=lambda progress: told.append(progress.text)
+        sweep, out, SweepOptions(1), on_progress=lambda progress: told.append(progress.text)
     )
     assert [text.partition(",")[0] for text in told] == [
         f"{n} of 12 points resolved" for n in range(1, 13)

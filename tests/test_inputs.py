@@ -27,7 +27,7 @@ from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.units import parse_quantity, quantity_text
 from walkers.physics.mixtures import water_glycerol
 from walkers.postprocess.measure.uncertainty import lines_of_rest, rests_on
-from walkers.runs.preview import describe, summarise
+from walkers.runs.preview import preview_text, summarise
 from walkers.sweeps.spread import spread_sweep
 
 QUANTITIES = {
@@ -85,7 +85,7 @@ def test_quantities_are_read_in_si_and_nothing_else_is() -> None:
     ],
 )
 def test_bounds_of_a_quantity_are_told_in_its_unit(
-    text: str, kind: units.Kind, bounds: str
+    text: str, kind: units.QuantityKind, bounds: str
 ) -> None:
     with pytest.raises(ValueError, match=f"it must lie between {re.escape(bounds)}$"):
         parse_quantity(text, kind)
@@ -441,7 +441,9 @@ def test_a_case_takes_from_the_library_beside_it_and_keeps_what_it_took(in_folde
     assert summarise(case)["beads"]["stiffness_ratio"] == pytest.approx(
         0.02
     )  # 50 MPa instead of its 2.5 GPa
-    assert "Young's modulus of the beads reduced by a factor of 50\n" in describe(summarise(case))
+    assert "Young's modulus of the beads reduced by a factor of 50\n" in preview_text(
+        summarise(case)
+    )
     # What it took goes along: into case.json, sweeps, spreads and their archives.
     varied = spread_sweep(case, 2)
     assert "contact.friction.bead_wall" in varied.keys

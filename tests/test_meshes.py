@@ -24,7 +24,7 @@ from walkers.inputs.meshes.wall_names import names_of_faces
 from walkers.inputs.tables.shapes.vessel import VesselShape
 from walkers.runner import failures
 from walkers.runner.cost import predicted_seconds
-from walkers.runs.preview import describe, summarise
+from walkers.runs.preview import preview_text, summarise
 
 DATA = Path(__file__).parent / "data" / "meshes"
 BOXES = [
@@ -488,7 +488,7 @@ def test_names_of_walls_are_unique() -> None:
 
 
 def text_of(boundary: dict[str, Any]) -> str:
-    lines = describe(summarise(build_case(poured(**boundary)))).splitlines()
+    lines = preview_text(summarise(build_case(poured(**boundary)))).splitlines()
     return next(line for line in lines if line.startswith("vessel"))
 
 

@@ -24,8 +24,8 @@ from walkers.inputs.sweep import expand
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.measure.gait import gait
-from walkers.sweeps.record import read_record, write_record
-from walkers.sweeps.scheduler import Options, plan_sweep, run_sweep
+from walkers.sweeps.record import read_sweep_record, write_record
+from walkers.sweeps.scheduler import SweepOptions, plan_sweep, run_sweep
 from walkers.text import rendered
 from walkers.theory.mathieu import alignment
 from walkers.theory.prediction import (
@@ -66,16 +66,16 @@ def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
             if "descend" in given:
                 given["descend"] |= {"from": "1.4 g", "to": "0.4 g", "step": "0.2 g"}
             sweep = expand(given, source=name, name=name, folder=shipped("sweep")[name].parent)
-            assert not run_sweep(sweep, out, Options(2))[1]
+            assert not run_sweep(sweep, out, SweepOptions(2))[1]
         for name in FACTS:
             whole = sweep_of(name)
             columns = dict(zip(whole.keys, map(list, zip(*whole.rows, strict=True)), strict=True))
             del columns["run.most_cycles"]
             given = {"case": "fig1b", "set": {**SHORT, "dimers.replicates": 1}, "zip": [columns]}
             sweep = expand(given, source=name, name=name, folder=out)
-            write_record(plan_sweep(sweep, out, Options(1)).record)
+            write_record(plan_sweep(sweep, out, SweepOptions(1)).record)
             if name == of_facts("shipped"):  # the other sets have what they share with it
-                assert not run_sweep(sweep, out, Options(2))[1]
+                assert not run_sweep(sweep, out, SweepOptions(2))[1]
 
     return Sources(once("paper", run))
 
@@ -216,7 +216,9 @@ def test_figures_and_comparison_do_without_what_failed(
 ) -> None:
     """Sweeps of which each has lost its first run, or all."""
     gone = {
-        run for sweep in (*FEWER, *FACTS) for run in read_record(sources.out / sweep).runs[:lost]
+        run
+        for sweep in (*FEWER, *FACTS)
+        for run in read_sweep_record(sources.out / sweep).runs[:lost]
     }
     for path in (path for path in sources.out.iterdir() if path.name not in gone):
         if path.name in (*FEWER, *FACTS):
@@ -291,7 +293,7 @@ def test_dimers_turn_as_the_pendulum_does_but_as_much_faster_as_their_beads_are_
 def test_a_run_that_failed_is_left_out_and_told(tmp_path: Path) -> None:
     """An engine that is stopped at once."""
     made = make_figures(
-        tmp_path / "runs", tmp_path / "to", Options(1, time_limit=1e-3), only=["fig3"]
+        tmp_path / "runs", tmp_path / "to", SweepOptions(1, time_limit=1e-3), only=["fig3"]
     )
     assert {failure.reason for failure in made.failures["fig3"]} == {"TimeLimitExceeded"}
     assert list(made.left_out) == ["fig3"]

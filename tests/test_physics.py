@@ -321,7 +321,7 @@ def test_contacts_are_as_stiff_as_their_bridges_ask_for(name: str, modulus: floa
     case = load_case(name)
     assert case.contact.youngs_modulus == modulus
     for share, late in ((1.0, False), (0.25, True))[: 1 + (modulus > 50e6)]:
-        softened = case.put("contact.youngs_modulus", share * modulus)
+        softened = case.with_value_at("contact.youngs_modulus", share * modulus)
         if case.walkers:
             radius, reduced = max(case.radii), share * modulus / (2.0 * (1.0 - 0.3**2))
             weight = 4.0 / 3.0 * pi * radius**3 * case.beads.density * case.pressing_gravity

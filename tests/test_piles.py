@@ -23,8 +23,8 @@ from walkers.inputs.resolving.loads import (
 )
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.measure.motion import FLOOR, read_bridges, read_motion
-from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.motion import FLOOR_INDEX, read_bridges, read_motion
+from walkers.postprocess.measure.results import read_results
 from walkers.postprocess.show.figures import figures_of
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runs.preview import notes
@@ -75,7 +75,7 @@ def test_a_pile_settles_is_shaken_and_is_whole(pile_run: Path) -> None:
 
 
 def test_bridges_and_tables_are_of_the_beads(pile_run: Path) -> None:
-    motion, result = read_motion(pile_run), read(pile_run)
+    motion, result = read_motion(pile_run), read_results(pile_run)
     frames, bed, members = list(read_bridges(motion)), result.table("bed"), result.table("members")
     assert len(frames) == len(motion.time) == len(bed)
     bridges, position, radius = frames[-1], motion.position[-1], motion.radius
@@ -84,7 +84,7 @@ def test_bridges_and_tables_are_of_the_beads(pile_run: Path) -> None:
         bridges.gap[: len(apart)], apart - radius[bridges.beads].sum(axis=1), atol=1e-9
     )
     beads, walls = bridges.at_walls
-    on_floor = beads[walls == FLOOR]
+    on_floor = beads[walls == FLOOR_INDEX]
     assert len(on_floor) == len(set(on_floor.tolist())) > 3
     assert (position[on_floor, 2] - radius[on_floor] < 2e-4).all()
     at = np.searchsorted(bed["time"], members["time"])
@@ -102,7 +102,7 @@ def test_bridges_and_tables_are_of_the_beads(pile_run: Path) -> None:
 
 def test_numbers_at_the_start_are_those_of_the_first_frame_of_the_drive(pile_run: Path) -> None:
     """Not of the first frame of the run, in which the beads still fall."""
-    result = read(pile_run)
+    result = read_results(pile_run)
     bed = result.table("bed")
     driven = bed[bed["time"] >= 0.0]
     for name in ("surface", "brazil_nut"):
@@ -141,7 +141,9 @@ def test_a_container_holds_its_beads(shape: str, walls: int, tmp_path: Path) -> 
     )
     assert -1e-5 < room.min() < 0.05 * 2.5e-3
     assert driven[..., :2].std() > 0.2 * 2.5e-3
-    held = [bridges.at_walls[0, bridges.at_walls[1] != FLOOR] for bridges in read_bridges(motion)]
+    held = [
+        bridges.at_walls[0, bridges.at_walls[1] != FLOOR_INDEX] for bridges in read_bridges(motion)
+    ]
     assert sum(map(len, held)) >= 2
     assert all(
         set(bridges.at_walls[1].tolist()) <= set(range(1 + walls))
@@ -295,7 +297,7 @@ def test_the_program_on_piles(pile_run: Path, in_folder: Path) -> None:
         r"\n  beads +60\n(.*\n)*  bridges per bead to others, at rest ", told("run", run)
     )
     assert told("plot", run, "--to", "here") == "here/climb.png"
-    assert spoilt(figures_of(read(pile_run))["climb"]) == []
+    assert spoilt(figures_of(read_results(pile_run))["climb"]) == []
     assert told("render", run, "--to", "here/box.png", "--images", "2") == "here/box.png"
     picture = pv.read(in_folder / "here" / "box.png")
     across, up, _ = picture.dimensions

@@ -20,8 +20,8 @@ from walkers.physics import portable
 from walkers.physics.laplace import _branch, _Family
 from walkers.physics.reynolds import _logarithmic_slope
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import case_of
 from walkers.runner.manifest import read_manifest
+from walkers.runner.run_directory import case_of
 from walkers.runs.comparison import Side, compare_runs
 from walkers.runs.making import BridgeTablesDiffer
 from walkers.templates.deck import BRIDGES_NAME, bridge_tables_digest, render_deck

@@ -35,17 +35,17 @@ from walkers import load_case
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.commands import ALL_COMMANDS, Command
-from walkers.errors import InputError, InputErrors, WalkersError, refused, unusable
+from walkers.errors import InputError, InputErrors, WalkersError, input_error, key_error
 from walkers.extras import EXTRAS, ExtraMissing, module_of
 from walkers.inputs.reading import shipped
 from walkers.main import program
-from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.results import read_results
 from walkers.postprocess.measure.tables import read_table
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import is_finished
 from walkers.runner.failures import EngineFailure
 from walkers.runner.manifest import read_manifest
-from walkers.sweeps.scheduler import Options
+from walkers.runner.run_directory import is_finished
+from walkers.sweeps.scheduler import SweepOptions
 from walkers.sweeps.site import load_site
 from walkers.theory.prediction import predict
 
@@ -169,14 +169,14 @@ def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -
 
 NEEDING: dict[str, list[Callable[[walkers.Run, Path], object]]] = {
     "archive": [lambda run, out: run.export("archive", out / "run.zip")],
-    "calibrate": [lambda _, out: calibrate(load_calibration("ruby"), out, Options(1))],
+    "calibrate": [lambda _, out: calibrate(load_calibration("ruby"), out, SweepOptions(1))],
     "check": [lambda *_: importlib.reload(importlib.import_module("walkers.second_engine"))],
     "cluster": [lambda _, out: load_site(out / "site.toml")],
     "film": [lambda run, out: run.film(out / "film.mp4")],
     "report": [lambda run, out: run.report(out / "run.html"), lambda run, _: run.view()],
     "theory": [
         lambda *_: predict(walkers.load_case("fig1b")),
-        lambda _, out: make_figures(out / "runs", out / "figures", Options(1)),
+        lambda _, out: make_figures(out / "runs", out / "figures", SweepOptions(1)),
     ],
 }
 
@@ -263,7 +263,7 @@ def test_two_beads_walk_toward_the_large_one(run_directory: Callable[..., Path])
     directory = run_directory(run=SHORT)
     assert is_finished(directory)
     assert read_manifest(directory)["engine"]["version"] == "LIGGGHTS-PUBLIC 3.8.0"
-    assert 1e-3 < read(directory)["velocity"] < 1e-2
+    assert 1e-3 < read_results(directory)["velocity"] < 1e-2
     assert len(read_table(directory, "trajectory")) == 61
 
 
@@ -363,7 +363,7 @@ def test_every_public_function_of_the_modules_of_commands_is_a_command() -> None
     "error",
     [
         InputErrors(
-            [refused("one", "expected another"), unusable("drive.frequency", "expected Hz", 3)]
+            [input_error("one", "expected another"), key_error("drive.frequency", "expected Hz", 3)]
         ),
         ExtraMissing("report", ["k3d"]),
         EngineFailure("stopped", Path("runs/one"), lost=3),
@@ -438,8 +438,8 @@ def test_a_function_gives_what_its_command_prints(looked_through: Path) -> None:
     assert json.loads(json.dumps(walkers.compare(*runs, looked_through).contents)) == printed
     with pytest.raises(InputError, match=r"grid: is a sweep.s directory: walkers list"):
         walkers.compare("grid", "rough", looked_through)
-    refused = call("list", "grid", "--all", *out).stderr
-    assert refused == "walkers: --all: is for folders, not for a sweep\n"
+    input_error = call("list", "grid", "--all", *out).stderr
+    assert input_error == "walkers: --all: is for folders, not for a sweep\n"
 
 
 def test_the_package_exports_few_names_that_are_documented() -> None:

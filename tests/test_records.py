@@ -16,7 +16,7 @@ from walkers.inputs.records.record import Record, record_of
 from walkers.inputs.records.record_file import read_record
 from walkers.inputs.records.signals import slow_part
 from walkers.postprocess.measure.motion import boundary_motion, read_motion
-from walkers.postprocess.measure.threshold import applies, directions
+from walkers.postprocess.measure.threshold import applies, drive_changes
 from walkers.postprocess.show.scene import Scene
 from walkers.runs.preview import notes
 
@@ -33,7 +33,7 @@ def record(time: Any, x: Any, y: Any = 0.0, z: Any = 0.0, *, repeats: bool = Fal
     columns = np.broadcast_arrays(time, x, y, z)
     made = record_of({"rows": np.column_stack(columns).tolist()})
     assert isinstance(made, Record)
-    return made.but(repeats=repeats)
+    return made.with_values(repeats=repeats)
 
 
 def sine_of(periods: float, rate: float = 4000.0, phase: float = 0.0) -> tuple[Any, Any]:
@@ -430,7 +430,9 @@ def test_a_record_that_changes_without_a_threshold_has_a_velocity(tmp_path: Path
 def test_a_threshold_needs_walkers(pile_run: Path) -> None:
     """A ramp of a pile has none."""
     case = read_motion(pile_run).case
-    assert not applies(case.but(drive=case.drive.but(ramp=((0.0, 1.0), (0.1, 0.5)))))
+    assert not applies(
+        case.with_values(drive=case.drive.with_values(ramp=((0.0, 1.0), (0.1, 0.5))))
+    )
 
 
 @pytest.mark.parametrize(
@@ -443,7 +445,7 @@ def test_a_threshold_needs_walkers(pile_run: Path) -> None:
     ],
 )
 def test_noise_of_an_amplitude_has_no_direction(peaks: list[float], expected: list[int]) -> None:
-    assert directions(np.array(peaks), 0.2).tolist() == expected
+    assert drive_changes(np.array(peaks), 0.2).tolist() == expected
 
 
 # --- refused ----------------------------------------------------------------------------------------------------------

@@ -29,8 +29,8 @@ from tests.conftest import PATIENCE, document, make_case, to_toml, wait_for
 from walkers.inputs.sweep import expand
 from walkers.postprocess.measure.caption import caption
 from walkers.postprocess.measure.motion import read_bridges, read_motion
-from walkers.postprocess.measure.numbers import rows, shown
-from walkers.postprocess.measure.results import not_computed, read
+from walkers.postprocess.measure.numbers import number_text, rows
+from walkers.postprocess.measure.results import not_computed, read_results
 from walkers.postprocess.measure.tables import read_table
 from walkers.postprocess.show.figures import figures_of
 from walkers.postprocess.show.report.page import LARGEST, svg_of
@@ -38,8 +38,8 @@ from walkers.postprocess.show.report.player import camera_of, player_of
 from walkers.postprocess.show.report.run import report_run
 from walkers.postprocess.show.scene import gathered
 from walkers.rounding import rounded
-from walkers.sweeps.scheduler import Options, run_sweep
-from walkers.sweeps.table import load
+from walkers.sweeps.scheduler import SweepOptions, run_sweep
+from walkers.sweeps.table import load_table
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -103,7 +103,7 @@ def swept(once: Once) -> Path:
             "case": "base.toml",
             "axes": {"drive.frequency": ["60 Hz", "70 Hz"]},
         }
-        run_sweep(expand(given, source="two", name="two", folder=out), out, Options(2))
+        run_sweep(expand(given, source="two", name="two", folder=out), out, SweepOptions(2))
         sweep = walkers.load("two", out)
         sweep.runs[1].report()
         sweep.report()
@@ -121,7 +121,7 @@ def test_numbers_of_a_report_are_the_results_with_what_is_not_computed_and_param
     name: str, request: pytest.FixtureRequest
 ) -> None:
     path, directory = (request.getfixturevalue(f"{name}_{what}") for what in ("report", "run"))
-    page, results = Report(path), read(directory)
+    page, results = Report(path), read_results(directory)
     assert all(f"{row.label}{row.text}{row.unit}{row.error}" in page.words for row in rows(results))
     assert f"Uncertainty not computed: {not_computed(results).text}." in page.words
     assert path.stat().st_size < LARGEST
@@ -156,7 +156,7 @@ def test_a_report_refers_to_nothing_outside_and_a_users_words_are_words(
 def test_a_sweeps_report_has_its_figure_and_table_and_links_to_the_reports_of_its_runs(
     swept: Path, swept_report: Path
 ) -> None:
-    page, table = Report(swept_report), load(swept)
+    page, table = Report(swept_report), load_table(swept)
     assert all(
         f'<td class="number">{rounded(1e3 * one, "mm/s")}</td>' in page.text
         for one in table["velocity"]
@@ -181,7 +181,7 @@ def test_a_reports_figures_are_those_that_are_plotted_and_fewer_frames_make_it_s
 ) -> None:
     text, drawings = (
         walked_report.read_text("utf-8"),
-        [svg_of(one) for one in figures_of(read(walked_run)).values()],
+        [svg_of(one) for one in figures_of(read_results(walked_run)).values()],
     )
     assert len(drawings) == 2
     assert all(one in text and "<metadata" not in one and "purl.org" not in one for one in drawings)
@@ -219,7 +219,7 @@ def test_the_player_shows_the_motion(walked_run: Path) -> None:
         speed = way * motion.radius[number] / (motion.time[-1] - motion.time[settled])
         assert speed == pytest.approx(rotation[f"rotation_{number + 1}"], rel=0.01, abs=2e-6)
     weightless = replace(
-        motion, case=motion.case.put("environment.gravity", 0.0)
+        motion, case=motion.case.with_value_at("environment.gravity", 0.0)
     )  # is seen as the floor lies
     assert camera_of(weightless) == camera_of(motion)
 
@@ -265,8 +265,12 @@ def test_words_and_numbers() -> None:
         "rad": ("14.32", "°"),
         "share": ("25", "%"),
     }
-    assert {unit: shown(0.25, unit) for unit in texts} == texts
-    aside = make_case().put("boundary.tilt", pi / 3.0).put("boundary.uphill", pi / 2.0)
+    assert {unit: number_text(0.25, unit) for unit in texts} == texts
+    aside = (
+        make_case()
+        .with_value_at("boundary.tilt", pi / 3.0)
+        .with_value_at("boundary.uphill", pi / 2.0)
+    )
     assert caption(aside).endswith("plane tilted by 60°, up is at 90° from x toward y")
 
 

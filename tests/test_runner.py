@@ -40,27 +40,27 @@ from walkers import run as run_case
 from walkers.cache import is_trusted
 from walkers.inputs.tables.case import Case
 from walkers.physics.laws import young_laplace
-from walkers.runner import audit, directory, failures, model_sources
+from walkers.runner import audit, failures, model_sources
 from walkers.runner.binary import find_engine
 from walkers.runner.compiled_model import plugin_of
-from walkers.runner.directory import (
+from walkers.runner.failures import EngineNeverStarted
+from walkers.runner.launch import EngineReport, judge
+from walkers.runner.manifest import read_manifest, write_manifest
+from walkers.runner.run_directory import (
     FIRST_SEGMENT,
     case_of,
     is_finished,
     is_locked,
-    layout_of,
     leave_out_dumps,
     locked,
+    read_layout,
     run_place,
 )
-from walkers.runner.failures import EngineNeverStarted
-from walkers.runner.launch import EngineReport, judge
-from walkers.runner.manifest import read_manifest, write_manifest
 from walkers.runs.making import make_runs
 from walkers.runs.names import find
 from walkers.templates.deck import RESTART_NAME, Deck, Segment, render_deck, whole
 
-PATIENCE_OF_LOCKS = "walkers.runner.directory._PATIENCE_SECONDS"
+PATIENCE_OF_LOCKS = "walkers.runner.run_directory._PATIENCE_SECONDS"
 
 
 def _toml(folder: Path, **run: object) -> str:
@@ -87,7 +87,7 @@ def test_the_name_depends_on_what_determines_the_run() -> None:
     assert name(title="another title") == name()
     other = replace(find_engine(), sha256="0" * 64)
     assert run_place(make_case(), other, Path()).name != name()
-    long = run_place(make_case().but(name="a b/" * 100), other, Path()).name
+    long = run_place(make_case().with_values(name="a b/" * 100), other, Path()).name
     assert (len(long) < 100, "/" in long) == (True, False)
 
 
@@ -105,7 +105,7 @@ def test_contents_of_a_run_directory(tmp_path: Path) -> None:
     dumps = {"beads.bin", "bridges.pairs.txt", "bridges.walls.txt"}
     deck = {"layout.json", "walker.lig", "bridges.txt", "engine.log", "segment.json", "run.sh"}
     assert {path.name for path in (run / FIRST_SEGMENT).iterdir()} == deck | dumps
-    assert (case_of(run), layout_of(run / FIRST_SEGMENT)) == (case, render_deck(case).layout)
+    assert (case_of(run), read_layout(run / FIRST_SEGMENT)) == (case, render_deck(case).layout)
     manifest = read_manifest(run)
     assert (manifest["status"], manifest["steps"]) == ("finished", case.run.steps)
     assert manifest["engine"]["sha256"] == find_engine().sha256
@@ -676,7 +676,7 @@ def test_decks_of_another_version_are_other_runs(
     case, engine = make_case(), find_engine()
     place = run_place(case, engine, tmp_path)
     assert run_place(case, engine, tmp_path) == place
-    monkeypatch.setattr(directory, name, getattr(directory, name) + 1)
+    monkeypatch.setattr(run_directory, name, getattr(run_directory, name) + 1)
     assert run_place(case, engine, tmp_path) != place
 
 

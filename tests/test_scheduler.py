@@ -41,14 +41,14 @@ from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.sweep import load_sweep
 from walkers.progress import Progress
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import case_of, unfinished
 from walkers.runner.failures import WalkersMet
+from walkers.runner.run_directory import case_of, unfinished
 from walkers.runs.making import DECK_FOLDER, make_runs, progress_at
 from walkers.sweeps.record import write_record
 from walkers.sweeps.scheduler import (
     LONGEST_SECONDS,
     MOST_WALKERS,
-    Options,
+    SweepOptions,
     SweepReplacedWarning,
     SweepStopped,
     makespan,
@@ -57,7 +57,7 @@ from walkers.sweeps.scheduler import (
     run_sweep,
 )
 from walkers.sweeps.site import check_path, decks_at, load_site, prepare
-from walkers.sweeps.table import load, thresholds
+from walkers.sweeps.table import load_table, thresholds
 from walkers.templates.deck import LAYOUT_NAME, OUTPUT_NAME, compose, plan_of
 from walkers.templates.placement import sharing_key
 
@@ -127,7 +127,7 @@ def test_what_may_differ_within_a_deck() -> None:
 def test_a_deck_of_several_processes_takes_as_many_cores(ranks: int, in_folder: Path) -> None:
     sweep = {"case": "pile-ci", "set": {"run.ranks": ranks}, "axes": {"run.seed": [1, 2]}}
     (in_folder / "piles.toml").write_text(to_toml(sweep))
-    plan = plan_sweep(load_sweep("piles.toml"), Path("runs"), Options(2))
+    plan = plan_sweep(load_sweep("piles.toml"), Path("runs"), SweepOptions(2))
     engine_seconds = sum(deck.seconds for deck in plan.decks)
     assert engine_seconds > 0.0
     assert plan.core_seconds == pytest.approx(ranks * engine_seconds + plan.overhead)
@@ -174,7 +174,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
         call("sweep", "test.toml", folder=folder).stdout.splitlines()[0]
         == "test: 4 points, 4 finished"
     )
-    shutil.rmtree(load(folder / "runs" / "test")["run"][3])
+    shutil.rmtree(load_table(folder / "runs" / "test")["run"][3])
     return folder
 
 
@@ -189,7 +189,7 @@ def test_a_plan_of_a_sweep_runs_nothing_and_counts_what_is_missing(
 
 
 def test_a_table_has_the_values_of_each_point_in_the_units_of_the_sweep(swept: Path) -> None:
-    frame = load(swept / "runs" / "test")
+    frame = load_table(swept / "runs" / "test")
     expected = {
         "point": [0, 1, 2, 3],
         "dimers.radii[0]": [0.3, 0.3, 0.25, 0.25],
@@ -207,7 +207,7 @@ def test_a_table_has_the_values_of_each_point_in_the_units_of_the_sweep(swept: P
 
 
 def test_a_table_has_the_results_of_its_runs(swept: Path) -> None:
-    frame = load(swept / "runs" / "test")
+    frame = load_table(swept / "runs" / "test")
     for row in frame[:3].itertuples():
         directory = Path(row.run)
         numbers = json.loads((directory / "result.json").read_text())["numbers"]
@@ -220,7 +220,7 @@ def test_a_table_has_the_results_of_its_runs(swept: Path) -> None:
 def test_a_table_is_written_as_csv_with_the_units_in_its_header(swept: Path) -> None:
     call("list", "runs/test", "--to", "table.csv", check=True, folder=swept)
     written = pd.read_csv(swept / "table.csv")["velocity (m/s)"]
-    np.testing.assert_array_equal(written, load(swept / "runs" / "test")["velocity"])
+    np.testing.assert_array_equal(written, load_table(swept / "runs" / "test")["velocity"])
 
 
 def test_a_table_is_written_as_parquet_with_types_for_missing_points(swept: Path) -> None:
@@ -233,7 +233,7 @@ def test_a_table_is_written_as_parquet_with_types_for_missing_points(swept: Path
 
 
 def test_a_table_is_printed_as_json_and_as_text(swept: Path) -> None:
-    frame = load(swept / "runs" / "test")
+    frame = load_table(swept / "runs" / "test")
     contents = json.loads(call("list", "runs/test", "--json", check=True, folder=swept).stdout)
     assert [point["amplitude"] for point in contents["points"]][:3] == list(frame["amplitude"][:3])
     text = call("list", "test", check=True, folder=swept).stdout
@@ -250,12 +250,12 @@ def test_a_descent_finds_where_the_walkers_stop(
     text += '[descend]\nfrom = "1.4 g"\nto = "0.2 g"\nstep = "0.2 g"\nuntil_below = "0.002 mm/s"'
     done = call("sweep", sweep_file(text, run={"cycles": 20, "settling_cycles": 10}))
     assert done.returncode == 0, done.stderr
-    for _, descent in load(in_folder / "runs" / "test").groupby("drive.frequency"):
+    for _, descent in load_table(in_folder / "runs" / "test").groupby("drive.frequency"):
         assert list(descent["drive.peak_acceleration"]) == pytest.approx(
             [1.4 - 0.2 * n for n in range(7)]
         )
         assert list(descent["velocity"] < 2e-6) == sorted(descent["velocity"] < 2e-6)
-    ends = thresholds(load(in_folder / "runs" / "test"))
+    ends = thresholds(load_table(in_folder / "runs" / "test"))
     assert list(ends["moving"] - ends["at_rest"]) == pytest.approx([0.2, 0.2])
     assert ends["moving"].nunique() == 1
     assert "moving (g)" in done.stdout
@@ -298,7 +298,7 @@ def test_a_failing_point_does_not_stop_the_others(
         True,
         True,
     )
-    frame = load("runs/test")
+    frame = load_table("runs/test")
     assert list(frame["status"]) == [DONE, DONE, "failed", DONE, DONE]
     assert (frame["reason"][2], list(frame["lost"])) == (reason, [0, 0, lost, 0, 0])
     failed = Path(frame["run"][2])
@@ -374,7 +374,7 @@ def test_two_sweeps_over_the_same_points_share_them(
     runs = {
         run
         for name in points
-        for run in zip(points[name], load(f"runs/{name}")["run"], strict=True)
+        for run in zip(points[name], load_table(f"runs/{name}")["run"], strict=True)
     }
     made = {
         str(path.parent.relative_to(in_folder))
@@ -402,7 +402,7 @@ def test_workers_that_are_handed_over_give_the_same(
         worker = pool.submit(os.getpid).result()
         (in_folder / "front").write_text(f'#!/bin/sh\nkill -9 {worker}\nexec liggghts "$@"\n')
         (in_folder / "front").chmod(0o755)
-        options, engine = Options(1, executor=pool), str(in_folder / "front")
+        options, engine = SweepOptions(1, executor=pool), str(in_folder / "front")
         with pytest.raises(SweepStopped, match="executor's workers ended"):
             run_sweep(load_sweep("sweep.toml"), in_folder / "again", options, engine=engine)
 
@@ -418,13 +418,13 @@ def test_another_sweep_of_the_same_name_is_told(
     out = in_folder / "runs"
     with warnings.catch_warnings():
         warnings.simplefilter("error", SweepReplacedWarning)
-        run_sweep(first, out, Options(1))
-        run_sweep(edited, out, Options(1))
+        run_sweep(first, out, SweepOptions(1))
+        run_sweep(edited, out, SweepOptions(1))
     with pytest.warns(SweepReplacedWarning, match="same name"):
-        run_sweep(other, out, Options(1))
-    record = plan_sweep(first, out / "new", Options(1)).record
+        run_sweep(other, out, SweepOptions(1))
+    record = plan_sweep(first, out / "new", SweepOptions(1)).record
     with pytest.raises(SweepStopped, match="same name"):
-        run_sweep(edited, out / "new", Options(1), on_progress=lambda _: write_record(record))
+        run_sweep(edited, out / "new", SweepOptions(1), on_progress=lambda _: write_record(record))
 
 
 def test_the_share_of_a_sweep_that_is_done_is_that_of_its_work(
@@ -449,7 +449,7 @@ def test_the_share_of_a_sweep_that_is_done_is_that_of_its_work(
         gates[progress.text.startswith("1 of 2 points done")].set()
 
     with Gated(1) as executor:
-        run_sweep(loaded, in_folder / "runs", Options(1, executor=executor), on_progress=look)
+        run_sweep(loaded, in_folder / "runs", SweepOptions(1, executor=executor), on_progress=look)
     shares = [progress.share for progress in seen]
     halfway = [progress for progress in seen if progress.text.startswith("1 of 2 points done")]
     assert (shares, shares[0] < 0.5, shares[-1], bool(halfway)) == (sorted(shares), True, 1.0, True)
@@ -485,12 +485,12 @@ def test_what_parsl_is_told(tmp_path: Path) -> None:
     )
     config = load_site(tmp_path / "site.toml")
     assert [decks_at(config, ranks) for ranks in (1, 3, 17)] == [2 * 16 * 4, 2 * 5 * 4, 0]
-    assert [Options(6, site).for_ranks(3).decks_at_once for site in (config, None)] == [
+    assert [SweepOptions(6, site).for_ranks(3).decks_at_once for site in (config, None)] == [
         2 * 5 * 4,
         2,
     ]
     with pytest.raises(InputError, match="17 MPI processes"):
-        Options(6, config).for_ranks(17)
+        SweepOptions(6, config).for_ranks(17)
     (executor,) = prepare(config, tmp_path / "parsl", 3).executors
     provider = executor.provider
     told = {
@@ -626,7 +626,10 @@ def test_a_sweep_through_slurm(
         True,
     ), errors
     wait_for(lambda: not jobs())
-    assert list(load("cluster/test")["status"]) == ["finished"] * 2 + ["failed"] + ["finished"] * 5
+    assert (
+        list(load_table("cluster/test")["status"])
+        == ["finished"] * 2 + ["failed"] + ["finished"] * 5
+    )
     assert bits(in_folder / "cluster") == bits(in_folder / "local") != {}
 
 

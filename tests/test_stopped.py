@@ -35,7 +35,7 @@ from tests.conftest import (
 from walkers import run as run_case
 from walkers.inputs.reading import shipped
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.measure.results import measure, read
+from walkers.postprocess.measure.results import measure, read_results
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import RunBusy
 from walkers.runner.launch import ALONE, _off_the_network
@@ -176,7 +176,7 @@ def test_stopped_and_gone_on(
         (folder / "leftover").touch()
     for part in out.glob("pile*.incomplete"):
         measure(part)  # nothing of it may stay
-        assert read(part)["driven"] == 0.0
+        assert read_results(part)["driven"] == 0.0
     monkeypatch.delenv("HALT")
     call(*command.partition(" --site")[0].split(), "--engine", "./engine", check=True)
     whole = bits(undisturbed / "runs")
@@ -262,7 +262,7 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(
     front: Callable[[str], str], in_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The kernel ends an engine whose launcher dies, but not the engine's children."""
-    monkeypatch.setattr("walkers.runner.directory._PATIENCE_SECONDS", 0.5)
+    monkeypatch.setattr("walkers.runner.run_directory._PATIENCE_SECONDS", 0.5)
     case, engine = make_case(run=LONG), front('liggghts "$@"\nexit 0')
     (in_folder / "test.toml").write_text(to_toml(document(run=LONG)))
     program = subprocess.Popen(

@@ -16,13 +16,13 @@ from matplotlib.figure import Figure
 import walkers
 from tests.conftest import TINY, document, to_toml
 from walkers.errors import InputError
-from walkers.runner.directory import case_of
+from walkers.runner.run_directory import case_of
 from walkers.sweeps.factors import factors_of
 from walkers.sweeps.figure import SCATTER
 from walkers.sweeps.figure import figure_of as figure_of_table
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.left_out import LeftOutWarning
-from walkers.sweeps.record import read_record
+from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.table import SweepTable, table_of
 from walkers.theory.prediction import MODEL, PAPER, predict
 
@@ -388,7 +388,7 @@ def test_a_theory_far_from_the_runs_is_shown_up_to_its_nearer_end(
     curves = {"near": (1e-3, 2e-3), "far": far}
     (axes,) = _panels(
         figure_of_table(
-            table_of(read_record(looked_through / "grid")),
+            table_of(read_sweep_record(looked_through / "grid")),
             predict=lambda cases, _: (
                 {name: np.linspace(*ends, len(cases)) for name, ends in curves.items()},
                 {},

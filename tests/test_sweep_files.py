@@ -20,18 +20,18 @@ from walkers.files import read_json
 from walkers.inputs.case_building import build_case
 from walkers.inputs.resolving.library import unmeasured
 from walkers.inputs.resolving.loads import dimer_of
-from walkers.inputs.sweep import Sweep, expand, load_sweep
+from walkers.inputs.sweep import SweepDefinition, expand, load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure import meetings
 from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.numbers import band_text
 from walkers.postprocess.measure.uncertainty import SPREAD_NAME, held_text, spread_of
 from walkers.sweeps.record import SweepRecord
-from walkers.sweeps.scheduler import Options
-from walkers.sweeps.spread import describe, run_spread, spread_in, spread_sweep
+from walkers.sweeps.scheduler import SweepOptions
+from walkers.sweeps.spread import run_spread, spread_in, spread_sweep, spread_text
 from walkers.sweeps.table import groups, key_values, table_of, thresholds
 
-Make = Callable[..., Sweep]
+Make = Callable[..., SweepDefinition]
 
 
 @pytest.fixture
@@ -39,7 +39,7 @@ def make(tmp_path: Path) -> Make:
     """Expand a sweep over the reference case, which says everything that a case may say in other words too."""
     (tmp_path / "base.toml").write_text(to_toml(document()))
 
-    def expanded(**tables: Any) -> Sweep:
+    def expanded(**tables: Any) -> SweepDefinition:
         return expand(
             {"case": "base.toml", **tables}, source="test.toml", name="test", folder=tmp_path
         )
@@ -47,7 +47,7 @@ def make(tmp_path: Path) -> Make:
     return expanded
 
 
-def _cases(sweep: Sweep) -> list[Case]:
+def _cases(sweep: SweepDefinition) -> list[Case]:
     return list(sweep.cases())
 
 
@@ -339,12 +339,12 @@ def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives() -> None:
 def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     """Glass on polystyrene at 10 g walks or not as one guesses; the single number, exact to 1e-5, does not say so."""
     case = build_case({**GLASS, "run": {"cycles": 6}}, name="guessed")
-    spread = run_spread(case, runs_folder, Options(2), points=4)
+    spread = run_spread(case, runs_folder, SweepOptions(2), points=4)
     warned = [
         run.result.warnings for run in walkers.load(spread.directory).runs if run.result.warnings
     ]
     assert warned == list(spread.doubts)
-    told = describe(replace(spread, doubts=[["one", "two"], ["three"]]))
+    told = spread_text(replace(spread, doubts=[["one", "two"], ["three"]]))
     assert "warning  2 draws with warnings, first: one\n" in told
     rough = {
         "contact.roughness.bead_bead",
@@ -358,7 +358,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
         f"liquid.{name}" for name in ("name", "surface_tension", "density", "kinematic_viscosity")
     }
     assert {one.key for one in spread.held} == given | liquid
-    text = describe(spread)
+    text = spread_text(spread)
     assert "contact_angle 0 deg (0 deg to 60 deg)" in text
     assert "liquid.kinematic_viscosity 14.5 mm^2/s (ethylene glycol), contact." in " ".join(
         text.split()
@@ -413,4 +413,4 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
             build_case({**GLASS, "uncertain": {"contact.restitution": [0.4, 0.8]}}, name="beside")
         )
     with pytest.raises(InputError, match="no value is uncertain"):
-        run_spread(build_case(REFERENCE), runs_folder, Options(2))
+        run_spread(build_case(REFERENCE), runs_folder, SweepOptions(2))

@@ -23,7 +23,7 @@ from walkers.inputs.tables.boundary import Boundary
 from walkers.physics.bridge import Surfaces
 from walkers.physics.laws import LAWS
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import run_place
+from walkers.runner.run_directory import run_place
 from walkers.templates.bridge_tables import TOLERANCE, RecordedLaw, tabulated
 from walkers.templates.deck import (
     BEADS_NAME,
@@ -37,7 +37,7 @@ from walkers.templates.deck import (
     render_deck,
     settling_steps,
 )
-from walkers.templates.placement import Bead, Scene, place
+from walkers.templates.placement import Bead, PlacedBodies, place
 
 
 @pytest.mark.parametrize("name", shipped("case"))
@@ -85,7 +85,7 @@ def test_beads_of_a_file_may_have_densities_of_their_own() -> None:
         Bead(1, (0.0, 0.0, 1e-3), 1e-3),
         Bead(2, (0.0, 3e-3, 1e-3), 1e-3, surface=2, density=2500.0),
     )
-    scene = Scene(beads, (), (-1.0, -1.0, 0.0), (1.0, 1.0, 1.0))
+    scene = PlacedBodies(beads, (), (-1.0, -1.0, 0.0), (1.0, 1.0, 1.0))
     atoms = _beads_data(scene, 4000.0, types=3).partition("Atoms\n\n")[2].splitlines()[:2]
     assert atoms == ["1 1 0.002 4000.0 0.0 0.0 0.001", "2 2 0.002 2500.0 0.0 0.003 0.001"]
 
@@ -163,7 +163,7 @@ def test_the_box_of_a_deck_has_room_for_beads_that_are_placed_far_from_the_origi
 def test_a_mixture_is_placed_by_its_seed() -> None:
     pile = load_case("pile-ci")
     places = [
-        [bead.centre for bead in place((pile.put("run.seed", seed),))[0].beads]
+        [bead.centre for bead in place((pile.with_value_at("run.seed", seed),))[0].beads]
         for seed in (1, 1, 2)
     ]
     assert places[0] == places[1] != places[2]
@@ -237,7 +237,7 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
     round_one = Boundary(
         shape="cylinder", material=square.material, width=square.width, height=square.height
     )
-    piles += [piles[0].put("run.ranks", 2), piles[0].but(boundary=round_one)]
+    piles += [piles[0].with_value_at("run.ranks", 2), piles[0].with_values(boundary=round_one)]
     for case in piles:
         settled = settling_steps(case)
         end = settled + case.run.cycles_per_segment * case.run.steps_per_cycle

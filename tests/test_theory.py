@@ -21,7 +21,7 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.gait import gait
 from walkers.postprocess.measure.motion import Group
-from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.results import read_results
 from walkers.postprocess.measure.tables import read_table
 from walkers.theory.mathieu import (
     LARGEST_STABLE_V,
@@ -30,8 +30,8 @@ from walkers.theory.mathieu import (
     time_to_turn,
     turning_rate,
 )
-from walkers.theory.motion import Walker, walk
-from walkers.theory.prediction import alignment_of, describe, motion_of, predict, threshold
+from walkers.theory.motion import Walker, predict_motion
+from walkers.theory.prediction import alignment_of, motion_of, predict, prediction_text, threshold
 from walkers.theory.quasistatic import CONTACTS, detachment, mass_asymmetry, mean_velocity
 
 
@@ -50,7 +50,7 @@ def test_a_dimer_without_friction_comes_to_its_speed_on_a_slope_as_in_the_engine
     )
     case, steps, frequency = moved.case, 1000, moved.case.excitation.frequency
     pull = case.axial_gravity
-    motion = walk(
+    motion = predict_motion(
         Walker.of_case(case),
         frequency,
         0.0,
@@ -93,7 +93,7 @@ def test_bridges_slow_the_theorys_walker_as_they_do_the_engines(
 ) -> None:
     """Its velocity, both beads' rotation and the sliding at all contacts."""
     case = load_case(case, changes) if case else changed_case(make_case(), changes)
-    result, motion = read(run_directory(case)), motion_of(case)
+    result, motion = read_results(run_directory(case)), motion_of(case)
     found = [result["velocity"], result["rotation_1"], result["rotation_2"]]
     found += [result["sliding_1"], result["sliding_2"], result["sliding_pair_1"]]
     expected = [motion.velocity[0], *motion.rotation[:, 0], *motion.sliding[:, 0]]
@@ -120,10 +120,14 @@ def test_a_further_effect_is_what_the_same_forces_of_bridges_are() -> None:
         walker.resistances
         + drag * np.array([1.0, lever, lever**2])[:, None, None] * np.eye(3)[0][:, None]
     )
-    expected = walk(replace(walker, friction=2.0 * walker.friction, resistances=drags), 80.0, 60.0)
+    expected = predict_motion(
+        replace(walker, friction=2.0 * walker.friction, resistances=drags), 80.0, 60.0
+    )
     terms = np.array([[drag / walker.force_unit[0], 2.0]])
-    found = walk(walker, 80.0, 60.0, steps_per_cycle=1024, effect=(_drag_of_the_first_bead, terms))
-    assert abs(walk(walker, 80.0, 60.0).velocity[0] / expected.velocity[0] - 1.0) > 0.2
+    found = predict_motion(
+        walker, 80.0, 60.0, steps_per_cycle=1024, effect=(_drag_of_the_first_bead, terms)
+    )
+    assert abs(predict_motion(walker, 80.0, 60.0).velocity[0] / expected.velocity[0] - 1.0) > 0.2
     np.testing.assert_allclose(
         found.sliding, expected.sliding, rtol=5e-3, atol=5e-3 * float(expected.velocity[0])
     )
@@ -172,8 +176,10 @@ def test_cycles_that_differ_by_the_error_of_the_steps_are_of_one_gait() -> None:
 
 def test_many_walkers_are_what_each_is_alone() -> None:
     walker, accelerations = Walker.of_case(make_case()), np.linspace(5.0, 80.0, 12)
-    alone = [walk(walker, 80.0, one, cycles=6).velocity[0] for one in accelerations]
-    np.testing.assert_array_equal(walk(walker, 80.0, accelerations, cycles=6).velocity, alone)
+    alone = [predict_motion(walker, 80.0, one, cycles=6).velocity[0] for one in accelerations]
+    np.testing.assert_array_equal(
+        predict_motion(walker, 80.0, accelerations, cycles=6).velocity, alone
+    )
 
 
 @pytest.mark.parametrize("friction", [0.05, 0.3])
@@ -185,7 +191,7 @@ def test_the_engines_walkers_start_at_the_theorys_threshold(
     case = make_case(contact=law, run={"cycles": 12, "settling_cycles": 8})
     expected = threshold(case)
     cases = [changed_case(case, {"drive.gamma0": share * expected}) for share in (0.7, 1.3)]
-    below, above = (read(run_directory(one))["velocity"] for one in cases)
+    below, above = (read_results(run_directory(one))["velocity"] for one in cases)
     assert abs(below) < 2e-6 < above
 
 
@@ -251,7 +257,8 @@ def test_the_engines_contacts_open_where_the_theory_says(
         for share in (0.8, 1.25)
     ]
     closed, opened = (
-        read(run_directory(changed_case(case, {"drive.peak_acceleration": peak}))) for peak in peaks
+        read_results(run_directory(changed_case(case, {"drive.peak_acceleration": peak})))
+        for peak in peaks
     )
     assert [closed[f"open_{contact}"] for contact in ("1", "2", "pair_1")] == [0.0] * 3
     assert (end["reason"], opened["open_pair_1"] > 0.1) == ("bead on bead would open", True)
@@ -262,8 +269,9 @@ def test_contacts_of_beads_that_slide_at_a_small_friction_stay_closed() -> None:
     case = load_case("symmetric")
     prediction, strongest = predict(case), 16.0 * float(Walker.of_case(case).at_rest.max())
     assert prediction["detachment"] == {"gamma": strongest, "reason": None}
-    assert f"stay closed up to about Γ0 = {strongest:.2g}, the strongest drive tried" in describe(
-        prediction, None
+    assert (
+        f"stay closed up to about Γ0 = {strongest:.2g}, the strongest drive tried"
+        in prediction_text(prediction, None)
     )
 
 
@@ -389,7 +397,7 @@ def test_the_program_prints_theory_beside_the_engine(in_folder: Path) -> None:
     assert contents["engine"]["velocity"] == pytest.approx(
         contents["viscous"]["velocity"], rel=0.08
     )
-    table = describe(contents, contents["engine"]).splitlines()
+    table = prediction_text(contents, contents["engine"]).splitlines()
     assert f"{contents['viscous']['velocity'] * 1e3:.3f}" in table[3]
     (in_folder / "up.toml").write_text(to_toml(document(drive={"axis": "z"})))
     done = call("show", "up.toml", "--theory")
@@ -410,6 +418,6 @@ def test_on_a_level_plate_ruby_stays_on_the_axis_and_symmetric_dimers_turn_acros
     )
     assert turns["rate"] == pytest.approx(1.5, rel=0.01)
     assert (turns["v"], turns["stands"], turns["turns_over_after"]) == (0.0, False, None)
-    told = describe(predict(load_case("symmetric")), None)
+    told = prediction_text(predict(load_case("symmetric")), None)
     assert "no torque toward the axis if the beads roll" in told
     assert "turns away from the axis, from 1° to 10° in about" in told

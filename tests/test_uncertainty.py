@@ -32,12 +32,12 @@ from walkers.postprocess.measure.tables import read_columns
 from walkers.postprocess.measure.uncertainty import SPREAD_NAME, spread_of
 from walkers.postprocess.measure.walking import _velocities
 from walkers.rounding import rounded
-from walkers.runs.case_text import kind_of
+from walkers.runs.case_text import quantity_kind
 from walkers.sweeps.accuracy import measure_accuracy, times_of
-from walkers.sweeps.listing import as_text, inventory
-from walkers.sweeps.scheduler import Options
+from walkers.sweeps.listing import inventory, listing_text
+from walkers.sweeps.scheduler import SweepOptions
 from walkers.sweeps.table import default_column
-from walkers.theory.prediction import describe, predict
+from walkers.theory.prediction import predict, prediction_text
 
 
 def test_what_is_usual_lies_within_its_range() -> None:
@@ -53,7 +53,9 @@ def test_what_is_usual_lies_within_its_range() -> None:
     for key, (known, ends) in numbers.items():
         assert known is not None
         assert ends is not None
-        kind = kind_of(key.partition(" of ")[0].replace("contact.meniscus", "liquid.meniscus"))
+        kind = quantity_kind(
+            key.partition(" of ")[0].replace("contact.meniscus", "liquid.meniscus")
+        )
         value, low, high = (
             parse_quantity(one, kind) if kind else one for one in (known.written, *ends)
         )
@@ -99,7 +101,7 @@ def test_a_slope_is_in_the_headline_of_a_run_and_of_its_report(
 
 
 def test_the_theory_is_beside_the_engines_walkers_that_face_up(steep: walkers.Run) -> None:
-    lines = describe(predict(steep.case), steep.result).splitlines()
+    lines = prediction_text(predict(steep.case), steep.result).splitlines()
     (engine,) = [line.split() for line in lines if line.startswith("engine")]
     assert engine[:3] == ["engine,", "facing", "up"]
     assert float(engine[3]) == pytest.approx(1e3 * steep.result["right_facing"], abs=1e-3)
@@ -116,7 +118,7 @@ def test_the_inventory_has_the_velocities_of_both_ways(steep: walkers.Run) -> No
     up, down = (
         rounded(1e3 * steep.result[name], "mm/s") for name in ("right_facing", "left_facing")
     )
-    assert f" {up} mm/s facing up, {down} facing down " in as_text(
+    assert f" {up} mm/s facing up, {down} facing down " in listing_text(
         inventory(steep.directory.parent)
     )
 
@@ -356,7 +358,7 @@ def test_an_interrupted_accuracy_continues_and_an_edited_one_can_be_measured_aga
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        measure_accuracy(done.directory, Options(1), on_progress=stop)
+        measure_accuracy(done.directory, SweepOptions(1), on_progress=stop)
     assert "velocity_error" not in done.result
     before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/manifest.json")}
     assert len(before) >= 2

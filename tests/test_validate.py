@@ -26,7 +26,7 @@ from walkers.postprocess.measure.motion import Motion
 from walkers.runner.failures import EngineFailure
 from walkers.runner.launch import ALONE
 from walkers.second_engine.crosscheck import courses
-from walkers.second_engine.lines import Line, Verdict, as_dict, as_text, failures
+from walkers.second_engine.lines import Line, Verdict, as_dict, failures, lines_text
 
 
 def test_the_published_points_are_those_of_the_tests() -> None:
@@ -145,8 +145,8 @@ def test_one_failed_line_fails_all_checks() -> None:
         True,
         [BAD],
     )
-    assert as_text(lines[1:], "engine: ").splitlines()[-1] == "engine: 1 of 2 lines fail"
-    assert as_text(lines[:1]).endswith("\nall 1 lines pass")
+    assert lines_text(lines[1:], "engine: ").splitlines()[-1] == "engine: 1 of 2 lines fail"
+    assert lines_text(lines[:1]).endswith("\nall 1 lines pass")
 
 
 def _pile(cycles: list[float]) -> Motion:

@@ -26,10 +26,10 @@ from walkers.postprocess.measure.motion import read_bridges
 from walkers.postprocess.show.necks import ends_of
 from walkers.postprocess.show.scene import walls_of
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import run_place
-from walkers.runs.preview import describe, summarise
-from walkers.second_engine.crosscheck import compare
-from walkers.second_engine.scenes import DRY, Bench, bench_case, full_case, prescribed, standing
+from walkers.runner.run_directory import run_place
+from walkers.runs.preview import preview_text, summarise
+from walkers.second_engine.crosscheck import cross_check
+from walkers.second_engine.scenes import DRY, Bench, bench_case, full_case, prescribed, scene_of
 from walkers.templates.deck import render_deck
 from walkers.templates.placement import Bead
 
@@ -75,7 +75,7 @@ def forces_on(
              for centre in centres.tolist()]  # fmt: skip
     case = motion.get("case", bench_case)(changes)
     return bench.run(
-        prescribed(case, standing(beads, vessel.facets), motion.get("steps", 2))
+        prescribed(case, scene_of(beads, vessel.facets), motion.get("steps", 2))
     ).forces[..., :3]
 
 
@@ -475,7 +475,7 @@ def test_a_bowl_of_facets_becomes_round(tmp_path: Path) -> None:
     assert off[1] / off[2] == pytest.approx(4.0, rel=0.1)
     walls = f"{len(vessel.triangles)} triangles in {len({*vessel.faces})} faces"
     opened = "(the mesh has 2048 triangles), open toward +z, 10 mm × 10 mm wide, 5 mm high"
-    assert f"vessel     {walls} {opened}" in describe(summarise(case))
+    assert f"vessel     {walls} {opened}" in preview_text(summarise(case))
     with pytest.raises(
         InputError,
         match=r"faces, edges and corners; expected at most .* for 50000 beads: a coarser mesh",
@@ -519,7 +519,7 @@ def test_beads_are_poured_into_a_vessel_and_stay_there(tmp_path: Path, boundary:
     np.testing.assert_allclose(done.case.boundary.vessel.clearance(ends), 0.0, atol=1e-9)
     if boundary == "funnel":
         with pytest.raises(InputError, match="the second engine knows no facets"):
-            compare([motion])
+            cross_check([motion])
     assert sum(len(corners) - 2 for corners in walls_of(motion)) == len(vessel.triangles)
     assert {"floor"} <= {wall.name for wall in walls}
 

@@ -26,13 +26,13 @@ from walkers.errors import InputError
 from walkers.inputs.resolving.loads import bridge_at_rest
 from walkers.inputs.tables.boundary import Boundary
 from walkers.postprocess.measure.motion import Group, Motion, read_bridges, read_motion
-from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.results import read_results
 from walkers.postprocess.measure.tables import read_table
 from walkers.postprocess.show.figures import (
     MOST_NAMED,
     _interpolated,
     figures_of,
-    looks_of,
+    line_styles,
     plot_run,
 )
 from walkers.postprocess.show.film_options import FilmOptions
@@ -235,12 +235,12 @@ def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
     assert b"/FontFile2" in pdf  # TrueType, embedded
     assert b"/Type3" not in pdf
     assert not list(tmp_path.glob("*.new"))
-    figures = figures_of(read(directory))
+    figures = figures_of(read_results(directory))
     assert [spoilt(figure) + letters(figure) for figure in figures.values()] == [
         ["a", "b", "c"],
         [],
     ]
-    looks = looks_of([str(number) for number in range(MOST_NAMED + 3)])
+    looks = line_styles([str(number) for number in range(MOST_NAMED + 3)])
     assert (
         len({(look["linestyle"], look["marker"], look["color"]) for look in looks[:MOST_NAMED]})
         == MOST_NAMED
@@ -249,7 +249,7 @@ def test_figures_of_runs_come_in_other_formats_and_can_be_printed(
 
 
 def test_gaits_are_smooth_and_go_through_the_samples(directory: Path) -> None:
-    (axes,) = figures_of(read(directory))["gait"].axes
+    (axes,) = figures_of(read_results(directory))["gait"].axes
     trajectory = read_table(directory, "trajectory").query("walker == 0")
     for line, name in zip(axes.lines, ("velocity", "rotation_1", "rotation_2"), strict=False):
         cycle, values = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
@@ -317,7 +317,7 @@ def test_rendering_shows_ruby_beads_on_a_grey_floor_and_cuts_nothing(
 def test_axes_of_a_picture_say_which_way_is_uphill(
     tilt: float, labels: list[str], motion: Motion
 ) -> None:
-    on_slope = replace(motion, case=motion.case.put("boundary.tilt", tilt))
+    on_slope = replace(motion, case=motion.case.with_value_at("boundary.tilt", tilt))
     (axes,) = _figure(on_slope, [0], follow=False).axes
     assert [axes.get_xlabel(), axes.get_ylabel()] == labels
 
@@ -360,8 +360,8 @@ def test_a_neck_has_the_volume_of_its_bridge(
 ) -> None:
     """Within what spheres differ from parabolas; a neck at a plane too, and one whose meniscus gives the volume."""
     if meniscus:
-        liquid = motion.case.liquid.but(volume_fraction=None, meniscus_radius=meniscus)
-        motion = replace(motion, case=motion.case.but(liquid=liquid))
+        liquid = motion.case.liquid.with_values(volume_fraction=None, meniscus_radius=meniscus)
+        motion = replace(motion, case=motion.case.with_values(liquid=liquid))
     for contact in ([0, 1, -1], [0, -1, 0]):
         radius, other = motion.radius[0], motion.radius[1] if contact[1] > 0 else 0.0
         place = np.array(
@@ -420,8 +420,8 @@ def test_a_scale_bar_is_as_long_as_beads_say(single: Motion) -> None:
 
 @pytest.mark.parametrize(("meet", "seen"), [(True, [-2.0, -2.0]), (False, [-2.0, 0.0])])
 def test_a_closed_tray_is_seen_from_above(meet: bool, seen: list[float], single: Motion) -> None:
-    boundary = single.case.boundary.but(shape="box", width=4e-3, height=3e-3)
-    case = single.case.but(boundary=boundary).put("dimers.meet", meet)
+    boundary = single.case.boundary.with_values(shape="box", width=4e-3, height=3e-3)
+    case = single.case.with_values(boundary=boundary).with_value_at("dimers.meet", meet)
     tray = replace(
         single, position=single.position - np.array([*single.walkers[0].origin, 0.0]), case=case
     )
@@ -512,7 +512,7 @@ def test_walls_are_whole_wherever_the_beads_are(
     """Beads high above the floor of a container, or far from the middle of what has no end; seams are at the ends."""
     away = [0.0, 0.0, 2e-3] if boundary.closed else [5e-2, 0.0, 0.0]
     beads = 0.1 * (motion.position - motion.position.mean(axis=(0, 1))) + away
-    placed = replace(motion, position=beads, case=motion.case.but(boundary=boundary))
+    placed = replace(motion, position=beads, case=motion.case.with_values(boundary=boundary))
     walls = mesh_of(walls_of(placed)).clean(tolerance=1e-9, absolute=True)
     assert (walls.n_cells, walls.bounds[4]) == (faces, pytest.approx(0.0, abs=1e-12))
     assert walls.n_open_edges == edges

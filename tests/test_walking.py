@@ -26,25 +26,31 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.measure.dump import DumpError
-from walkers.postprocess.measure.gait import averages, gait, settled_samples, turns_away_after, walk
+from walkers.postprocess.measure.gait import (
+    averages,
+    gait,
+    measure_walk,
+    settled_samples,
+    turns_away_after,
+)
 from walkers.postprocess.measure.motion import Group, read_bridges, read_motion
 from walkers.postprocess.measure.numbers import rows
 from walkers.postprocess.measure.quantities import TABLES, axis, declared, matches
-from walkers.postprocess.measure.results import modules_of, read
+from walkers.postprocess.measure.results import modules_of, read_results
 from walkers.postprocess.measure.sides import sides
 from walkers.postprocess.measure.tables import read_columns, read_table, write_table
 from walkers.postprocess.measure.walking import measure, walkers_met
 from walkers.postprocess.show.figures import figures_of
 from walkers.progress import Progress
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import (
+from walkers.runner.manifest import RESULT_NAME, read_manifest
+from walkers.runner.run_directory import (
     FIRST_SEGMENT,
     case_of,
     leave_out_dumps,
     recomputed,
     segment_directories,
 )
-from walkers.runner.manifest import RESULT_NAME, read_manifest
 from walkers.runs.making import make_runs
 from walkers.theory.mathieu import turning_rate
 
@@ -69,7 +75,7 @@ def test_velocity_is_the_strobed_displacement_over_time(moved: Group) -> None:
     seconds = (run.cycles - run.settling_cycles) / moved.case.excitation.frequency
     facing = np.array([walker.facing for walker in moved.walkers])
     crude = facing * (strobed[-1, :, 0] - strobed[0, :, 0]) / seconds
-    walked = walk(moved)
+    walked = measure_walk(moved)
     np.testing.assert_allclose(facing * walked["axial_velocity"], crude, rtol=1e-3)
     np.testing.assert_allclose(walked["velocity"], crude, rtol=0.01)
     lateral = (strobed[-1, :, 1] - strobed[0, :, 1]) / seconds
@@ -94,7 +100,7 @@ def test_walkers_of_both_headings_that_drift_to_one_side_have_one_lateral_veloci
     """Along y, to the left of the drive axis; nothing else of their velocities changes."""
     position = moved.position.copy()
     position[..., 1] += drift * moved.time[:, None, None]
-    before, after = walk(moved), walk(replace(moved, position=position))
+    before, after = measure_walk(moved), measure_walk(replace(moved, position=position))
     assert {walker.facing for walker in moved.walkers} == {1, -1}
     np.testing.assert_allclose(
         after["lateral_velocity"] - before["lateral_velocity"], drift, rtol=1e-9
@@ -106,9 +112,10 @@ def test_a_lateral_velocity_is_to_the_left_of_the_drive(moved: Group) -> None:
     """Driven along y, walkers that drift along x drift to the right."""
     position = moved.position.copy()
     position[..., 0] += 1e-3 * moved.time[:, None, None]
-    case = moved.case.put("drive.axis", "y")
+    case = moved.case.with_value_at("drive.axis", "y")
     before, after = (
-        walk(replace(moved, case=case, position=places)) for places in (moved.position, position)
+        measure_walk(replace(moved, case=case, position=places))
+        for places in (moved.position, position)
     )
     np.testing.assert_allclose(
         after["lateral_velocity"] - before["lateral_velocity"], -1e-3, rtol=1e-9
@@ -138,7 +145,7 @@ def test_a_walker_on_a_slope_turns_over_when_the_tangent_of_half_its_angle_is_on
     moved: Group, sign: float
 ) -> None:
     """dψ/dt = 2/s · sin ψ: tan(ψ/2) = tan(0.5°) exp(2t/s), from 1° to 90°."""
-    sloped = moved.case.put("boundary.tilt", 0.1)
+    sloped = moved.case.with_value_at("boundary.tilt", 0.1)
     angle = 2.0 * np.arctan(np.tan(np.radians(0.5)) * np.exp(2.0 * moved.time))
     left = np.log(1.0 / np.tan(np.radians(0.5))) / 2.0 - moved.time[-1]
     found = turns_away_after(_turned(moved, sign * angle, sloped))
@@ -180,7 +187,7 @@ def test_the_orientation_of_a_walker_that_goes_round_does_not_jump(moved: Group)
 
 
 def test_the_result_follows_the_papers_protocol(directory: Path) -> None:
-    result = read(directory)
+    result = read_results(directory)
     each = result.table("walkers")
     velocity, right = each["velocity"], each["velocity"][each["facing"] == 1]
     expected = [
@@ -215,7 +222,7 @@ def test_a_result_is_measured_again_by_walkers_run_alone(directory: Path, tmp_pa
     """One that was edited, that another version measured, and one whose table is damaged; the engine does not run."""
     copy = Path(shutil.copytree(directory, tmp_path / directory.name))
     before = {path: path.stat().st_mtime_ns for path in copy.rglob("*")}
-    right, contents = read(copy).as_dict(), read_json(copy / RESULT_NAME)
+    right, contents = read_results(copy).as_dict(), read_json(copy / RESULT_NAME)
     assert before == {
         path: path.stat().st_mtime_ns for path in copy.rglob("*")
     }  # reading writes nothing
@@ -224,7 +231,7 @@ def test_a_result_is_measured_again_by_walkers_run_alone(directory: Path, tmp_pa
         write_json(copy / RESULT_NAME, wrong)
         if wrong is not edited:
             with pytest.raises(InputError, match=f"walkers run {copy} measures it again"):
-                read(copy)
+                read_results(copy)
         assert walkers.run(copy).result.as_dict() == right
     (copy / "walkers.parquet").write_bytes(b"")
     (copy / "bridges.parquet").unlink()
@@ -268,17 +275,17 @@ def test_a_module_outdates_only_results_that_it_measured(
     leave_out_dumps(run)
     if not has_versions:
         _without_versions_of_modules(run)
-    right, written = read(run).as_dict(), (run / RESULT_NAME).read_bytes()
+    right, written = read_results(run).as_dict(), (run / RESULT_NAME).read_bytes()
     for module in (piles, meetings, threshold, record_part):
         monkeypatch.setattr(module, "VERSION", module.VERSION + 1)
-    assert read(run).as_dict() == right
+    assert read_results(run).as_dict() == right
     assert walkers.run(run).result.as_dict() == right
     assert (run / RESULT_NAME).read_bytes() == written
     monkeypatch.setattr(walking, "VERSION", walking.VERSION + 1)
     with pytest.raises(
         InputError, match=f"another version of the program; walkers run {run} measures it again"
     ):
-        read(run)
+        read_results(run)
     with pytest.raises(InputError, match="cannot be read"):
         walkers.run(run)
     assert (run / RESULT_NAME).read_bytes() == written
@@ -293,7 +300,7 @@ def test_a_run_with_dumps_is_measured_again_by_a_changed_module(
     assert read_json(run / RESULT_NAME)["modules"] == {"walking": walking.VERSION}
     if not has_versions:
         _without_versions_of_modules(run)
-    right = read(run).as_dict()
+    right = read_results(run).as_dict()
     monkeypatch.setattr(walking, "VERSION", walking.VERSION + 1)
     assert walkers.run(run).result.as_dict() == right
     assert read_json(run / RESULT_NAME)["modules"] == {"walking": walking.VERSION}
@@ -305,13 +312,13 @@ def test_a_result_of_a_module_that_has_ended_is_outdated(directory: Path, tmp_pa
     contents["modules"]["ended"] = 1
     write_json(run / RESULT_NAME, contents)
     with pytest.raises(InputError, match="was measured by another version of the program"):
-        read(run)
+        read_results(run)
 
 
 def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: RunDirectory) -> None:
     degrees = np.array([0.0, 91.0, 150.0, 20.0, -175.0])
     assert sides([1, 1, 1, -1, -1], np.radians(degrees)).tolist() == [1, 1, -1, -1, 1]
-    turned = read(run_directory(dimers={"angle": "150 deg"}, run=SHORT))
+    turned = read_results(run_directory(dimers={"angle": "150 deg"}, run=SHORT))
     assert [turned[name] for name in ("facing_right", "facing_left")] == [0, 1]
     assert np.isnan(turned["scatter"])  # a single walker
     assert str(figures_of(turned)["walk"].axes[1].lines[0].get_label()).startswith(
@@ -322,7 +329,7 @@ def test_walkers_are_named_by_the_direction_in_which_they_face(run_directory: Ru
 def test_on_slopes_rows_and_figures_are_by_the_way_up(run_directory: RunDirectory) -> None:
     """All numbers of those that face up alone say so; who goes up sees the path as it is drawn."""
     plane, sloped = (
-        read(run_directory(boundary={"tilt": tilt}, dimers={"replicates": 2}, run=SHORT))
+        read_results(run_directory(boundary={"tilt": tilt}, dimers={"replicates": 2}, run=SHORT))
         for tilt in ("0 deg", "10 deg")
     )
     labels = [{row.name: row.label for row in rows(result)} for result in (plane, sloped)]
@@ -487,7 +494,7 @@ def test_the_drive_pays_for_what_slides(run_directory: RunDirectory) -> None:
         contact={"friction": {"bead_wall": 0.01, "bead_bead": 1.0}, "rolling_friction": 0.0},
         run={"cycles": 60, "settling_cycles": 50, "samples_per_cycle": 20},
     )
-    case, result = case_of(directory), read(directory)
+    case, result = case_of(directory), read_results(directory)
     pressed = (
         sum(load.pull for load in contact_loads(case)[:2])
         + dimer_of(case).total_mass * case.pressing_gravity
@@ -508,7 +515,7 @@ def test_the_cost_of_transport_is_that_of_each_kinds_own_mass(run_directory: Run
         dimers={"replicates": 1}, run={"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
     )
     case = build_case({**tables, "clusters": [fan]}, name="two-kinds")
-    result = read(run_directory(case))
+    result = read_results(run_directory(case))
     cycles = result.table("cycles").set_index("cycle")
     costs = []
     for walker in result.table("walkers").itertuples():
@@ -526,7 +533,7 @@ def test_bridges_are_sampled_as_often_in_a_cycle_as_is_asked(run_directory: RunD
         "samples_per_cycle": 20,
         "bridge_samples_per_cycle": 4,
     }
-    result = read(run_directory(run=run))
+    result = read_results(run_directory(run=run))
     times = np.unique(result.table("bridges")["time"])
     np.testing.assert_allclose(times, np.arange(17) / (4.0 * 80.0), atol=1e-9)
 
@@ -614,14 +621,16 @@ def _shipped(angle: float = 0.0, **drive: Any) -> Case:
 
 def _turning() -> Case:
     """A walker that still turns to the axis after 12 cycles, and less and less after 24: little drags it."""
-    return _shipped(4.0, peak_acceleration="8 g").put("liquid.viscosity_ratio", 0.1)
+    return _shipped(4.0, peak_acceleration="8 g").with_value_at("liquid.viscosity_ratio", 0.1)
 
 
 def test_a_steady_walker_ends_early_at_the_speed_of_a_long_run(
     directory: Path, runs_folder: Path
 ) -> None:
     case = load_case("fig1b")
-    full = case.but(run=case.run.but(until_steady=False, cycles_per_segment=case.run.cycles))
+    full = case.with_values(
+        run=case.run.with_values(until_steady=False, cycles_per_segment=case.run.cycles)
+    )
     both = [walkers.load(directory), walkers.run(full, runs_folder)]
     lengths = [
         [run.result[name] for name in ("cycles", "settling_cycles", "ended_early")] for run in both
@@ -684,8 +693,8 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
         "uphill": ("boundary.tilt", 0.3),
         "thin": ("liquid.viscosity_ratio", 0.4),
     }
-    cases = [case.put(*change).but(name=name) for name, change in changes.items()]
-    cases.insert(1, _turning().but(name="turning"))
+    cases = [case.with_value_at(*change).with_values(name=name) for name, change in changes.items()]
+    cases.insert(1, _turning().with_values(name="turning"))
     together = make_runs(cases, tmp_path / "together", find_engine())
     assert {*together.values()} == {True}
     decks = [read_manifest(tmp_path / "together" / name).get("shared_deck") for name in together]
@@ -696,7 +705,7 @@ def test_company_does_not_matter_whatever_forces_it_feels(tmp_path: Path) -> Non
     for one in cases:
         (name,) = make_runs([one], tmp_path / "alone", find_engine())
         places = [tmp_path / folder / name for folder in ("together", "alone")]
-        velocities = [read(place).table("walkers")["velocity"][0] for place in places]
+        velocities = [read_results(place).table("walkers")["velocity"][0] for place in places]
         ways = [(motion := read_motion(place)).position - motion.position[0] for place in places]
         assert ways[0].shape == ways[1].shape
         assert np.abs(ways[0] - ways[1]).max() < 2e-5 * np.abs(ways[1]).max(), one.name

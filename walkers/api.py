@@ -17,7 +17,7 @@ from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Literal
 
 from walkers import DEFAULT_OUT
-from walkers.errors import InputError, Problem, apply_all, check_utf8, expected_of, refused
+from walkers.errors import InputError, Problem, apply_all, check_utf8, expected_of, input_error
 from walkers.files import read_json
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.measure import results
@@ -33,7 +33,7 @@ from walkers.postprocess.show.report.player import player_of
 from walkers.postprocess.show.report.run import report_run, result_html
 from walkers.postprocess.show.series import render_series
 from walkers.progress import Progress, in_notebook, progress_of
-from walkers.runner import directory as on_disk
+from walkers.runner import run_directory
 from walkers.runner.audit import check_audit
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import RunBusy
@@ -57,9 +57,9 @@ from walkers.sweeps.accuracy import measure_accuracy
 from walkers.sweeps.climbing import conditions_in, summarise_climbs, write_climbs
 from walkers.sweeps.figure import column_of, figure_of
 from walkers.sweeps.figure_options import FigureOptions
-from walkers.sweeps.record import SweepRecord, read_record
+from walkers.sweeps.record import SweepRecord, read_sweep_record
 from walkers.sweeps.report import report_sweep
-from walkers.sweeps.scheduler import Failure, Options, run_sweep
+from walkers.sweeps.scheduler import Failure, SweepOptions, run_sweep
 from walkers.sweeps.site import load_site
 from walkers.sweeps.spread import Spread, figures_of_spread, run_spread
 
@@ -116,21 +116,21 @@ def load(
         run = Run(named.path)
     else:
         raise not_a_run(named.given, named.kind)
-    if on_disk.is_finished(run.check().directory):
-        results.read(run.directory)  # refuses a result that cannot be read
+    if run_directory.is_finished(run.check().directory):
+        results.read_results(run.directory)  # refuses a result that cannot be read
     return run
 
 
 def _run_of_case(named: Reference) -> Run:
     """The run of a case, finished or begun; `InputError` if there is none."""
     case = named.case
-    place = on_disk.run_place(case, find_engine(), named.folder)
-    if on_disk.is_finished(place) or is_begun(place):
+    place = run_directory.run_place(case, find_engine(), named.folder)
+    if run_directory.is_finished(place) or is_begun(place):
         return Run(place, requested=case)
     name = str(named.given) if isinstance(named.given, (str, Path)) else case.name
     settings = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in named.changes.items()]
     command = " ".join(["walkers run", name, *settings])
-    raise refused(name, f"no finished run in {named.folder}; first do: {command}")
+    raise input_error(name, f"no finished run in {named.folder}; first do: {command}")
 
 
 def directory_of(
@@ -198,13 +198,13 @@ class Run:
     @property
     def progress(self) -> Progress | None:
         """Progress of a running run, in any process; None between segments, and if it is not running."""
-        return progress_at(self.directory) if on_disk.is_locked(self.directory) else None
+        return progress_at(self.directory) if run_directory.is_locked(self.directory) else None
 
     @property
     def finished_directory(self) -> Path:
         """The directory of a finished run; otherwise `InputError`."""
-        if not on_disk.is_finished(self.directory):
-            raise refused(self.directory, f"the run is {self._state}")
+        if not run_directory.is_finished(self.directory):
+            raise input_error(self.directory, f"the run is {self._state}")
         return self.directory
 
     @property
@@ -212,8 +212,8 @@ class Run:
         """The directory that holds the files now."""
         return (
             self.directory
-            if on_disk.is_finished(self.directory)
-            else on_disk.unfinished(self.directory)
+            if run_directory.is_finished(self.directory)
+            else run_directory.unfinished(self.directory)
         )
 
     @property
@@ -221,14 +221,14 @@ class Run:
         """The status of an unfinished run, and how to continue it."""
         if (status := self.status) == "running":
             return f"running{f': {progress.text}' if (progress := self.progress) else ''}"
-        failure = self._files / on_disk.FAILURE_NAME
+        failure = self._files / run_directory.FAILURE_NAME
         text = f": {read_json(failure).get('message')}" if failure.is_file() else ""
         return f"{status}{text}; continue it with: walkers run {self.directory}"
 
     @cached_property
     def case(self) -> Case:
         """The resolved case."""
-        return on_disk.case_of(self._files)
+        return run_directory.case_of(self._files)
 
     @property
     def origins(self) -> tuple[Origin, ...] | None:
@@ -238,7 +238,7 @@ class Run:
     @property
     def result(self) -> Results:
         """The result: numbers in SI units by name, with bands and numerical errors where these are measured."""
-        return results.read(self.finished_directory, self.origins)
+        return results.read_results(self.finished_directory, self.origins)
 
     @property
     def motion(self) -> Motion:
@@ -261,13 +261,13 @@ class Run:
 
     def describe(self) -> str:
         """The result as text in mm, mm/s and degrees; of an unfinished run, its progress."""
-        if not on_disk.is_finished(self.directory):
+        if not run_directory.is_finished(self.directory):
             return f"{self.directory.name}: {self._state}"
         return results.text(self.result, cached=self.cached)
 
     def _repr_html_(self) -> str:
         """The result in a notebook: a table with errors, units and warnings, and the parameters."""
-        if not on_disk.is_finished(self.directory):
+        if not run_directory.is_finished(self.directory):
             return f"<p>{escape(self.describe())}</p>"
         return result_html(self.result, self.origins)
 
@@ -326,7 +326,7 @@ class Run:
             return run_spread(
                 case,
                 self.directory.parent,
-                Options(),
+                SweepOptions(),
                 points=points,
                 engine=engine,
                 on_progress=advance,
@@ -345,7 +345,7 @@ class Run:
         """
         with progress_of(f"{self.case.name}, accuracy", progress) as advance:
             return measure_accuracy(
-                self.finished_directory, Options(), engine=engine, on_progress=advance
+                self.finished_directory, SweepOptions(), engine=engine, on_progress=advance
             )
 
     def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
@@ -374,10 +374,10 @@ def writer_of(form: str, options: Iterable[str] = ()) -> Callable[..., Path]:
         return option in signature(resolve_name(EXPORTS[name])).parameters
 
     if form not in EXPORTS:
-        raise refused("form", f"{form!r}: {expected_of(form, EXPORTS)}")
+        raise input_error("form", f"{form!r}: {expected_of(form, EXPORTS)}")
     for option in options:
         if not takes(form, option):
-            raise refused(
+            raise input_error(
                 option, f"is for --to {', '.join(name for name in EXPORTS if takes(name, option))}"
             )
     write: Callable[..., Path] = resolve_name(EXPORTS[form])
@@ -433,8 +433,8 @@ def run(
     for text in (out.absolute(), case.name):
         check_utf8(text)
     binary = find_engine(engine)
-    place = on_disk.run_place(case, binary, out)
-    if on_disk.is_finished(place) and not force:
+    place = run_directory.run_place(case, binary, out)
+    if run_directory.is_finished(place) and not force:
         return _measured(Run(place, requested=case))
     check_audit(binary)
     with progress_of(case.name, progress) as advance:
@@ -442,7 +442,7 @@ def run(
             [case], out, binary, force=force, on_progress=advance, time_limit=time_limit
         )
     if not runs:
-        raise RunBusy("another process is still running this case", on_disk.unfinished(place))
+        raise RunBusy("another process is still running this case", run_directory.unfinished(place))
     return Run(place, cached=not runs[place.name], requested=case)
 
 
@@ -450,9 +450,9 @@ def finished_at(named: Reference) -> Run | None:
     """The finished run with a name or a directory, also of a deck that was run by hand; None for a case."""
     if named.means_case or named.kind not in ("run", "deck"):
         return None
-    if on_disk.is_deck_folder(named.path):
+    if run_directory.is_deck_folder(named.path):
         take_in(named.path)
-    return _measured(Run(named.path)) if on_disk.is_finished(named.path) else None
+    return _measured(Run(named.path)) if run_directory.is_finished(named.path) else None
 
 
 def case_to_run(named: tuple[Reference, Run | None]) -> Case:
@@ -463,7 +463,7 @@ def case_to_run(named: tuple[Reference, Run | None]) -> Case:
 
 def _measured(run: Run) -> Run:
     """The run; a finished run is measured again if its result or a table cannot be read."""
-    if on_disk.is_finished(run.check().directory):
+    if run_directory.is_finished(run.check().directory):
         with refusing(run.directory, "the run"):
             results.ensure_measured(run.directory)
     return run
@@ -503,7 +503,7 @@ class Sweep:
         return [Run(self._record.out / name) for name in self._record.runs]
 
     def table(self) -> pd.DataFrame:
-        """One row per point; see `walkers.sweeps.table.load`. Kept once all points are finished; see `refresh`."""
+        """One row per point; see `walkers.sweeps.table.load_table`. Kept once all points are finished; see `refresh`."""
         return self._table.frame.copy()
 
     def refresh(self) -> Sweep:
@@ -513,7 +513,7 @@ class Sweep:
 
     @cached_property
     def _record(self) -> SweepRecord:
-        return read_record(self.directory)
+        return read_sweep_record(self.directory)
 
     @property
     def _table(self) -> of_points.SweepTable:
@@ -574,7 +574,7 @@ class Sweep:
         from walkers.archive.writing import write_archive
 
         if form != "archive":
-            raise refused(
+            raise input_error(
                 self.directory, f"is a sweep: expected one of its runs for {form}, or archive"
             )
         return write_archive(self.directory, _path(to), **options)
@@ -630,7 +630,7 @@ def sweep(
     {'liquid.name': ['Si AK5', 'Si AK10'], 'status': ['finished', 'finished']}
     """
     points = load_sweep(sweep, changes)
-    options = Options(jobs, load_site(Path(site)) if site else None, executor, time_limit)
+    options = SweepOptions(jobs, load_site(Path(site)) if site else None, executor, time_limit)
     folder = Path(out).resolve() if site else Path(out)
     with progress_of(points.name, progress) as advance:
         record, failures = run_sweep(points, folder, options, engine=engine, on_progress=advance)
@@ -661,7 +661,7 @@ def compare(
     The ``changes`` are of the second case, which by default is the first.
     """
     if second is None and not changes:
-        raise refused(first, "expected a second run, or changed values (--set KEY=VALUE)")
+        raise input_error(first, "expected a second run, or changed values (--set KEY=VALUE)")
 
     def side(name: str | Path, changes: Changes) -> Side:
         named = find(name, out, changes)
@@ -712,7 +712,7 @@ def climb(
                 (label, table.results_of(rows)) for label, rows in conditions_in(table.frame)
             ]
         else:
-            conditions = [("", [results.read(directory)])]
+            conditions = [("", [results.read_results(directory)])]
         for label, of_piles in conditions:
             words = [directory.name] if len(references) > 1 or not label else []
             words += [label] if label else []
@@ -739,7 +739,11 @@ def calibrate(
     from walkers.calibration.file import load_calibration
 
     return calibrate.calibrate(
-        load_calibration(calibration), Path(out), Options(jobs), progress=progress, engine=engine
+        load_calibration(calibration),
+        Path(out),
+        SweepOptions(jobs),
+        progress=progress,
+        engine=engine,
     )
 
 

@@ -107,14 +107,14 @@ class InputErrors(InputError):
         return InputErrors([error.renamed(name_of) for error in self.errors])
 
 
-def refused(source: object, expected: str) -> InputError:
+def input_error(source: object, expected: str) -> InputError:
     """An error for an unusable file, option or other source, with the expectation."""
     return InputError(str(source), [Problem("", None, expected)])
 
 
-def unusable(key: str, expected: str, value: object = None) -> InputError:
+def key_error(key: str, expected: str, value: object = None) -> InputError:
     """An error for an unusable value of a key; the reader adds file name and value (`walkers.inputs.messages`)."""
-    return InputError("", [Problem(key, None if value is None else shown(value), expected)])
+    return InputError("", [Problem(key, None if value is None else quoted(value), expected)])
 
 
 def apply_all(function: Callable[[T], R], arguments: Iterable[T]) -> list[R]:
@@ -131,7 +131,7 @@ def apply_all(function: Callable[[T], R], arguments: Iterable[T]) -> list[R]:
     return results
 
 
-def shown(value: object) -> str:
+def quoted(value: object) -> str:
     """A value as the user may have written it, shortened."""
     try:
         return shortened(json.dumps(value, ensure_ascii=False, default=str))
@@ -147,7 +147,7 @@ def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
 def check_limits(name: str, value: float | None, low: float, high: float = inf) -> None:
     """Refuse an argument that is given and not within its limits."""
     if value is not None and not low <= value <= high:
-        raise refused(
+        raise input_error(
             name,
             f"{value:g}: expected "
             + (f"{low:g} to {high:g}" if high < inf else f"{low:g} or more"),
@@ -160,7 +160,7 @@ def check_utf8(word: str | Path) -> None:
         str(word).encode("utf-8")
     except UnicodeEncodeError as error:
         odd = os.fsencode(str(word)).decode("utf-8", "backslashreplace")
-        raise refused(odd, "expected UTF-8 text") from error
+        raise input_error(odd, "expected UTF-8 text") from error
 
 
 def expected_of(word: str, names: Iterable[str]) -> str:

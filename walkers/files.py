@@ -23,7 +23,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import Any
 
-from walkers.errors import refused
+from walkers.errors import input_error
 
 
 def open_regular(path: Path) -> BufferedReader:
@@ -159,7 +159,9 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         expected = "expected a folder in which files can be written"
-        raise refused(folder, f"cannot create the folder ({error.strerror}): {expected}") from error
+        raise input_error(
+            folder, f"cannot create the folder ({error.strerror}): {expected}"
+        ) from error
 
 
 # --- folders that are filled before they get their name ---------------------------------------------------------------

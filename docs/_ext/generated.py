@@ -22,11 +22,18 @@ from pydantic.fields import FieldInfo
 from docs.tables import markdown
 from walkers.commands import ALL_COMMANDS
 from walkers.commands.catalogue import COMMANDS, NOT_KNOWN, catalogue
-from walkers.inputs.config_table import Table, example_of, keys_in, table_in
+from walkers.inputs.config_table import ConfigTable, example_of, keys_in, table_in
 from walkers.inputs.resolving.from_library import SUPPLIED
 from walkers.inputs.resolving.library import LibraryNumber
 from walkers.inputs.tables.case import CaseFile
-from walkers.inputs.units import ACCELERATION, AUTO, TEMPERATURE, Kind, kind_in, quantity_text
+from walkers.inputs.units import (
+    ACCELERATION,
+    AUTO,
+    TEMPERATURE,
+    QuantityKind,
+    kind_in,
+    quantity_text,
+)
 from walkers.main import print_help, program
 from walkers.postprocess.measure.quantities import GROUPS, TABLES, Quantity
 from walkers.sweeps.table import STATE
@@ -67,7 +74,9 @@ def _expected(hint: Any) -> str:
             for name, sign in _BOUNDS.items()
             if isinstance(getattr(bound, name, None), (int, float))
         )
-        refusals = (_refusal(note) for note in notes if isinstance(note, (BeforeValidator, Kind)))
+        refusals = (
+            _refusal(note) for note in notes if isinstance(note, (BeforeValidator, QuantityKind))
+        )
         expected = next(refusals, None) or _expected(inner)
         expected += ', or `"auto"`' if AUTO in notes else ""
         return f"{expected}; {bounds}" if bounds else expected
@@ -89,8 +98,8 @@ def _expected(hint: Any) -> str:
     return words.get(hint, "a table")
 
 
-def _refusal(validator: BeforeValidator | Kind) -> str | None:
-    if isinstance(validator, Kind):
+def _refusal(validator: BeforeValidator | QuantityKind) -> str | None:
+    if isinstance(validator, QuantityKind):
         low, high = (_in_unit(end, validator) for end in (validator.smallest, validator.largest))
         words = validator.expectation.removeprefix("expected ").partition(", such as")[0]
         if validator.unit == "rad" and validator.largest > 10.0:  # any angle
@@ -106,7 +115,7 @@ def _refusal(validator: BeforeValidator | Kind) -> str | None:
     return None
 
 
-def _in_unit(value: float, kind: Kind) -> str:
+def _in_unit(value: float, kind: QuantityKind) -> str:
     """A value in the unit of its kind's example, four digits; accelerations, of which gravity is one, in m/s²."""
     number, unit = (
         (value, kind.unit) if kind.unit == ACCELERATION.unit else quantity_text(value, kind).split()
@@ -135,7 +144,9 @@ def _row(name: str, field: FieldInfo, *, supplied: bool) -> tuple[str, str, str,
     )
 
 
-def tables_of_keys(model: type[Table] = CaseFile, place: str = "") -> Iterator[tuple[str, str]]:
+def tables_of_keys(
+    model: type[ConfigTable] = CaseFile, place: str = ""
+) -> Iterator[tuple[str, str]]:
     """Tables of a case file: heading, and its keys as a table of Markdown with what excludes what."""
     fields = keys_in(model)
     below = {name: table_in(field.annotation) for name, field in fields.items()}

@@ -27,13 +27,13 @@ def literature(
     """
     from studies.literature.checks import LITERATURE
     from walkers.inputs.bridge_laws import ExecutedLawWarning
-    from walkers.second_engine.lines import as_dict, as_text, failures, run_checks
+    from walkers.second_engine.lines import as_dict, failures, lines_text, run_checks
 
     warnings.simplefilter(
         "ignore", ExecutedLawWarning
     )  # the experiments have bridge laws of their own
     lines = run_checks(LITERATURE, out, only, tell)
-    print_as(as_json, lambda: as_dict(lines), lambda: as_text(lines))
+    print_as(as_json, lambda: as_dict(lines), lambda: lines_text(lines))
     return 1 if failures(lines) else 0
 
 

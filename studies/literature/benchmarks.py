@@ -100,10 +100,10 @@ class Benchmark:
         steps = ceil(_LONGEST * self.impact.duration(float(self.closing.min())) / self.step)
         case = (
             bench_case(DRY)
-            .put("beads.density", self.sphere.density)
-            .put("run.time_step", self.step)
+            .with_value_at("beads.density", self.sphere.density)
+            .with_value_at("run.time_step", self.step)
         )
-        contact = case.contact.but(
+        contact = case.contact.with_values(
             friction=Friction(bead_bead=self.friction, bead_wall=self.friction),
             restitution=self.restitution,
             youngs_modulus=(1.0 if self.like else 2.0)
@@ -112,7 +112,7 @@ class Benchmark:
             roughness=Roughness(bead_bead=0.01 * radius, bead_wall=0.01 * radius),
         )
         engine = SecondEngine(
-            case.but(contact=contact), np.full(len(start), radius), start, walls=[FLOOR]
+            case.with_values(contact=contact), np.full(len(start), radius), start, walls=[FLOOR]
         )
         every = 1 if count == 1 else steps
         return engine.run(steps, every)[:, :count]

@@ -33,7 +33,7 @@ from walkers.runner.binary import find_engine
 from walkers.second_engine.lines import Line
 from walkers.second_engine.scenes import DRY, FLOOR, STILL, Bench, R, bench_case, over, recording
 from walkers.templates.deck import Plan
-from walkers.templates.placement import Bead, Scene, loading_of, surface_of
+from walkers.templates.placement import Bead, PlacedBodies, loading_of, surface_of
 
 FRICTION, G = 0.2, 9.81
 SLOWS = (
@@ -112,7 +112,9 @@ def followed(
         centre, surface = (0.0, 8e-3 * n, bead.centre[2]), 1 + kinds.index(surface_of(case))
         placed.append(replace(bead, id=n + 1, centre=centre, surface=surface, loading=n))
     room = (-0.05, -0.01, -0.01), (0.05, 8e-3 * len(placed), 0.1)
-    scene = Scene(tuple(placed), tuple(walls), *room, tuple(kinds), tuple(map(loading_of, cases)))
+    scene = PlacedBodies(
+        tuple(placed), tuple(walls), *room, tuple(kinds), tuple(map(loading_of, cases))
+    )
     return bench.run(Plan(cases[0], scene, **recording(steps, every))).frames
 
 
@@ -180,7 +182,7 @@ def slider(bench: Bench, phase: float) -> FloatArray:
             Harmonic(axis="x", frequency=tone, peak_acceleration=peak, phase=angle)
             for tone, angle in tones
         )
-        cases.append(plain.put("drive.harmonics", tuple(sines)))
+        cases.append(plain.with_value_at("drive.harmonics", tuple(sines)))
     moves, turns = (
         start + 2.0 / 7.0 * drift,
         -5.0 / 7.0 * drift / R,
@@ -240,7 +242,11 @@ def restitutions(
     plain = _wet(
         GLASS, FILM, {**step, "liquid.law": law, "contact.youngs_modulus": f"{modulus} Pa"}
     )
-    cases = [plain.put("liquid.dynamic_viscosity", oil) for oil in OILS.tolist() for _ in SPEEDS]
+    cases = [
+        plain.with_value_at("liquid.dynamic_viscosity", oil)
+        for oil in OILS.tolist()
+        for _ in SPEEDS
+    ]
     high, far = 1.001 * FILM, 1.01 * bridge_at_rest(plain, GLASS, inf).rupture
     beads = [
         over(FLOOR, high, GLASS, (0.0, 0.0, -speed), STILL)
@@ -291,7 +297,9 @@ def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterato
         "run.time_step": "0.2 us",
     }
     plain = _wet(radius, film, weight)
-    oily, thin = (plain.put("liquid.dynamic_viscosity", viscosity) for viscosity in (0.1, 4.6e-3))
+    oily, thin = (
+        plain.with_value_at("liquid.dynamic_viscosity", viscosity) for viscosity in (0.1, 4.6e-3)
+    )
     ceiling, load = Flat((0.0, 0.0, 0.02), (0.0, 0.0, -1.0), "ceiling"), contact_loads(plain)[0]
     held = load.pull / (bead_volume(radius) * plain.pressing_gravity)
     beads = [
@@ -302,7 +310,7 @@ def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterato
         replace(bead, density=share * held)
         for bead, share in zip(beads[3:], (0.9, 1.1), strict=True)
     ]
-    cases = oily, oily.put("contact.friction.bead_wall", FRICTION), oily, thin, thin
+    cases = oily, oily.with_value_at("contact.friction.bead_wall", FRICTION), oily, thin, thin
     last = followed(bench, cases, beads, 300_000, 3000, (FLOOR, ceiling))[-1]
     rolls, gaps = np.abs(radius * last[:, 7] / last[:, 3]), 0.02 - radius - last[:, 2]
     sliding, coupling, rolling = resistances_at_rest(oily, radius, inf)

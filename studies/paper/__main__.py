@@ -8,7 +8,7 @@ from studies.paper.make import FORMATS, make_figures
 from walkers import DEFAULT_OUT
 from walkers.commands.options import Engine, Formats, Jobs, Out, print_lines, tell
 from walkers.main import main, new_app
-from walkers.sweeps.scheduler import Options
+from walkers.sweeps.scheduler import SweepOptions
 
 app = new_app("python -m studies.paper")
 
@@ -35,7 +35,7 @@ def paper(
     drawn = make_figures(
         out,
         to,
-        Options(jobs),
+        SweepOptions(jobs),
         only=only or (),
         formats=formats or FORMATS,
         engine=engine,

@@ -14,8 +14,8 @@ from studies.paper.sources import Sources, of_facts, ruby, sets, sweep_of, thres
 from walkers.calibration.observations import LEAST_SPEED, Observation, numbers_in
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
-from walkers.postprocess.measure.results import plain
-from walkers.runner.directory import case_of
+from walkers.postprocess.measure.results import json_numbers
+from walkers.runner.run_directory import case_of
 from walkers.theory.prediction import MODEL, PAPER, predicted_column
 
 Numbers = Mapping[str, Mapping[str, float]]
@@ -60,7 +60,7 @@ def compare(sources: Sources) -> dict[str, Any]:
             for name, of in cases.items()
         },
         "facts": facts,
-        "thresholds": [plain(row) for row in thresholds],
+        "thresholds": [json_numbers(row) for row in thresholds],
         "curve": [
             *_curve(
                 sources,
@@ -110,10 +110,10 @@ def _fact(
             for name in ("name", "title", "says", "source", "derived")
         },
         "expected": observation.text,
-        "values": plain({name: value * scale for name, value in values.items()}),
+        "values": json_numbers({name: value * scale for name, value in values.items()}),
         "texts": {name: _text_of(value, observation) for name, value in values.items()},
         "agree": {name: observation.agrees(value) for name, value in values.items()},
-        **plain({"theory": observation.of_numbers(theory) * scale}),
+        **json_numbers({"theory": observation.of_numbers(theory) * scale}),
     }
 
 
@@ -164,5 +164,5 @@ def _curve(
         ratio = fast / slow if len(group) > 1 and abs(slow) > LEAST_SPEED else nan
         means = {name: float(group[name].mean()) * 1e3 for name in models_of_curve}
         name = f"Fig. {sweep.removeprefix('fig')}, {label(float(group[column].iloc[0]))}"
-        rows.append({"of": name, **plain({**means, "by_frequency": ratio})})
+        rows.append({"of": name, **json_numbers({**means, "by_frequency": ratio})})
     return rows

@@ -22,7 +22,7 @@ from walkers.postprocess.show.necks import bridges_at
 from walkers.postprocess.show.scene import Scene, Window, axes_toward
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
-from walkers.sweeps.record import read_record
+from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.table import table_of
 from walkers.theory.prediction import MODEL, motion_of, predicted_column
 from walkers.theory.quasistatic import translation
@@ -89,7 +89,7 @@ def of_sweep(sources: Sources, name: str, **options: Any) -> Figure:
     """The figure of a sweep as `walkers plot` draws it."""
     chosen = FigureOptions(**options)
     sources.finished(name)
-    table = table_of(read_record(sources.out / name))
+    table = table_of(read_sweep_record(sources.out / name))
     return figure_of(table, chosen, predicted_column if chosen.theory else None)
 
 

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from studies.paper.comparison import compare
 from studies.paper.figures import fig1b, fig2_threshold, fig3, fig4, of_sweep
 from studies.paper.sources import NothingFinishedError, Sources, of_facts, sets, sweep_of
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.extras import require
 from walkers.files import write_bytes, write_json
 from walkers.postprocess.show.drawing import check_formats, save_figure
 from walkers.progress import progress_of
-from walkers.sweeps.scheduler import Failure, Options, run_sweep
+from walkers.sweeps.scheduler import Failure, SweepOptions, run_sweep
 from walkers.text import rendered
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class Made(NamedTuple):
 def make_figures(
     out: Path,
     to: Path,
-    options: Options,
+    options: SweepOptions,
     *,
     only: Sequence[str] = (),
     formats: Sequence[str] = FORMATS,
@@ -132,12 +132,12 @@ def _check_names(chosen: Iterable[str]) -> None:
     names = (*FIGURES, COMPARISON)
     for name in chosen:
         if name not in names:
-            raise refused("only", f'no figure "{name}"; expected one of {", ".join(names)}')
+            raise input_error("only", f'no figure "{name}"; expected one of {", ".join(names)}')
 
 
 def _check_folder(option: str, folder: Path) -> None:
     if folder.exists() and not folder.is_dir():
-        raise refused(option, f"expected a folder, {folder} is a file")
+        raise input_error(option, f"expected a folder, {folder} is a file")
 
 
 def _sweeps_of(chosen: Iterable[str]) -> list[str]:

@@ -12,12 +12,12 @@ import numpy as np
 from walkers.calibration.file import Calibration, load_calibration
 from walkers.errors import WalkersError
 from walkers.inputs.reading import load_case
-from walkers.inputs.sweep import Sweep, load_sweep
+from walkers.inputs.sweep import SweepDefinition, load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.measure.caption import liquid_text, radii_text
 from walkers.postprocess.measure.motion import Group, read_motion
-from walkers.sweeps.table import load, thresholds
+from walkers.sweeps.table import load_table, thresholds
 from walkers.theory.prediction import threshold
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def of_facts(name: str) -> str:
     return f"facts-{name.replace(' ', '-')}"
 
 
-def sweep_of(name: str) -> Sweep:
+def sweep_of(name: str) -> SweepDefinition:
     """A shipped sweep, or one of `of_facts`."""
     for label, values in sets().items():
         if name == of_facts(label):
@@ -81,7 +81,7 @@ class Sources:
     def __init__(self, out: Path) -> None:
         self.out = out
         self.table: Callable[[str], pd.DataFrame] = lru_cache(maxsize=None)(
-            lambda sweep: load(out / sweep)
+            lambda sweep: load_table(out / sweep)
         )
         self.trajectory: Callable[[str], Group] = lru_cache(maxsize=32)(
             lambda run: read_motion(run).groups[0]

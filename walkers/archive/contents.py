@@ -11,17 +11,17 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.files import checksum, json_bytes, open_regular
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import toml_bytes
 from walkers.postprocess.measure.uncertainty import ACCURACY, SPREAD, SPREAD_NAME
 from walkers.runner.compiled_model import build_script
-from walkers.runner.directory import SEGMENTS, case_of, name_of
 from walkers.runner.manifest import MANIFEST_NAME, read_manifest
 from walkers.runner.model_sources import model_sources
+from walkers.runner.run_directory import SEGMENTS, case_of, name_of
 from walkers.runs.making import DECK_FOLDER
-from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_record, states
+from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_sweep_record, states
 from walkers.templates.deck import BRIDGES_NAME, DECK_NAME
 
 RECORD_FILE = "archive.json"
@@ -40,14 +40,14 @@ _DUMPS = ("beads.bin", "bridges.*.txt", "state.restart")
 """Names of the dumps of the engine; ``bridges.txt`` has the tables of forces, which a deck needs."""
 
 
-class File(NamedTuple):
+class ArchiveFile(NamedTuple):
     """A file of an archive: its source or its contents, and its SHA-256."""
 
     source: Path | bytes
     sha256: str
 
     @classmethod
-    def of(cls, source: Path | bytes) -> File:
+    def of(cls, source: Path | bytes) -> ArchiveFile:
         """A file whose checksum no manifest has."""
         if isinstance(source, bytes):
             return cls(source, hashlib.sha256(source).hexdigest())
@@ -82,7 +82,7 @@ class Contents:
     title: str
     manifests: Mapping[str, dict[str, Any]]
     cases: Mapping[str, Case]
-    files: Mapping[str, File]
+    files: Mapping[str, ArchiveFile]
     main: Sequence[str]
 
     @property
@@ -135,12 +135,12 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
     """
     packing = _Packing(dumps)
     if (directory / RECORD_NAME).is_file():
-        record = read_record(directory)
+        record = read_sweep_record(directory)
         points = states(record)
         unfinished = sum(state.status != "finished" for state in points)
         if unfinished:
             message = f"{unfinished} of {len(points)} points are not finished; see: walkers list {directory}"
-            raise refused(directory, message)
+            raise input_error(directory, message)
         name, title = name_of(record.directory.name), record.sweep.title
         main = packing.add_sweep(record, name)
     else:
@@ -158,7 +158,7 @@ class _Packing:
 
     def __init__(self, dumps: bool) -> None:
         self.dumps = dumps
-        self.files: dict[str, File] = {}
+        self.files: dict[str, ArchiveFile] = {}
         self.manifests: dict[str, dict[str, Any]] = {}
         self.cases: dict[str, Case] = {}
         self.directories: dict[str, Path] = {}
@@ -166,7 +166,7 @@ class _Packing:
 
     def add(self, place: str, source: Path | bytes) -> None:
         """Add a file that no manifest lists."""
-        self.files[place] = File.of(source)
+        self.files[place] = ArchiveFile.of(source)
 
     def add_run(self, directory: Path) -> str:
         """Add the files of a run's manifest, and its case file if that is known; return the place of the run."""
@@ -185,7 +185,7 @@ class _Packing:
                 continue
             source = directory / name
             sums = manifest["sha256"]
-            file = File(source, sums[name]) if name in sums else File.of(source)
+            file = ArchiveFile(source, sums[name]) if name in sums else ArchiveFile.of(source)
             self.files[f"{place}/{name}"] = file
         if case.document:
             self.add(f"{place}/{name_of(case.name)}.toml", toml_bytes(case.document))
@@ -201,9 +201,9 @@ class _Packing:
 
     def add_sweep(self, record: SweepRecord, name: str) -> list[str]:
         """Add a sweep, its table and its finished runs; return the places of the runs."""
-        from walkers.sweeps.table import encoded, load
+        from walkers.sweeps.table import encoded, load_table
 
-        place, table = f"{RUNS}/{name}", load(record.directory)
+        place, table = f"{RUNS}/{name}", load_table(record.directory)
         # Places in the archive, not paths on this machine.
         table["run"] = [f"{RUNS}/{Path(run).name}" if run else "" for run in table["run"]]
         self.add(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)
@@ -223,7 +223,7 @@ class _Packing:
             directory = run.with_name(f"{run.name}{suffix}")
             if not (directory / RECORD_NAME).is_file():
                 continue
-            self.add_sweep(read_record(directory), directory.name)
+            self.add_sweep(read_sweep_record(directory), directory.name)
             bands = directory / SPREAD_NAME
             if bands.is_file():
                 self.add(f"{RUNS}/{directory.name}/{SPREAD_NAME}", bands)

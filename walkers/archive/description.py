@@ -22,7 +22,9 @@ _PROGRAM = ("granular_walkers", "commit", "python", "packages")
 """Software of a run, as manifests have it."""
 
 
-def record_of(contents: Contents, authors: Sequence[str], licence: str | None) -> dict[str, Any]:
+def archive_record(
+    contents: Contents, authors: Sequence[str], licence: str | None
+) -> dict[str, Any]:
     """The contents of ``archive.json``: what the archive is, and which programs made each run.
 
     Parameters
@@ -75,7 +77,7 @@ def _software_in(manifest: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def readme(contents: Contents, authors: Sequence[str], licence: str | None) -> str:
-    """The ``README.md`` of an archive, whose commands are for the first of its runs; see `record_of`."""
+    """The ``README.md`` of an archive, whose commands are for the first of its runs; see `archive_record`."""
     example = contents.main[0]
     deck_folder = contents.deck_folder(example)
     return rendered(

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from walkers.archive.contents import RECORD_FILE, SUMS_NAME
-from walkers.errors import refused
-from walkers.runner.directory import CASE_NAME, SEGMENTS
+from walkers.errors import input_error
 from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest
-from walkers.sweeps.record import RECORD_NAME, read_record, states
+from walkers.runner.run_directory import CASE_NAME, SEGMENTS
+from walkers.sweeps.record import RECORD_NAME, read_sweep_record, states
 from walkers.text import printable
 
 _READ = (".json", ".parquet", ".txt", ".lig", ".bin")
@@ -64,7 +64,7 @@ def verify(path: Path) -> list[Verification]:
         If the path is none of these, or the list of checksums of the archive cannot be read.
     """
     if (path / RECORD_NAME).is_file():
-        record = read_record(path)
+        record = read_sweep_record(path)
         points = states(record)
         missing = [
             f"{run} ({state.status}: point {number})"
@@ -85,7 +85,7 @@ def verify(path: Path) -> list[Verification]:
     if path.is_file():
         return [_of_zip(path)]
     kinds = f"a run directory (with a {MANIFEST_NAME}), a sweep's ({RECORD_NAME}), or an archive ({SUMS_NAME})"
-    raise refused(path, f"expected {kinds}")
+    raise input_error(path, f"expected {kinds}")
 
 
 def _of_run(directory: Path) -> Verification:
@@ -107,7 +107,9 @@ def _listed(path: Path, text: bytes) -> dict[str, str]:
     for line in text.decode("utf-8", "replace").splitlines():
         checksum, _, place = line.partition("  ")
         if len(checksum) != 64 or not place:
-            raise refused(path, f"{SUMS_NAME}: expected a checksum and a path, found {line[:80]!r}")
+            raise input_error(
+                path, f"{SUMS_NAME}: expected a checksum and a path, found {line[:80]!r}"
+            )
         listed[place] = checksum
     return listed
 
@@ -117,7 +119,7 @@ def _of_zip(path: Path) -> Verification:
     try:
         with zipfile.ZipFile(path) as archive:
             if SUMS_NAME not in archive.namelist():
-                raise refused(path, f"expected an archive, which has a {SUMS_NAME}")
+                raise input_error(path, f"expected an archive, which has a {SUMS_NAME}")
             listed = _listed(path, archive.read(SUMS_NAME))
             entries = Counter(archive.namelist())
             changed = [
@@ -126,7 +128,7 @@ def _of_zip(path: Path) -> Verification:
                 if name in entries and _checksum_in(archive, name) != checksum
             ]
     except _UNREADABLE as error:
-        raise refused(path, f"expected an archive, a zip file ({error})") from error
+        raise input_error(path, f"expected an archive, a zip file ({error})") from error
     unlisted = [name for name in entries if name not in listed and name != SUMS_NAME]
     # Of two files of a name, programs that unpack take one or the other.
     unlisted += [name for name, number in entries.items() if number > 1]

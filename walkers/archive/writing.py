@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
-from walkers.archive.contents import README_FILE, RECORD_FILE, SUMS_NAME, File, contents_of
-from walkers.archive.description import readme, record_of
-from walkers.errors import refused
+from walkers.archive.contents import README_FILE, RECORD_FILE, SUMS_NAME, ArchiveFile, contents_of
+from walkers.archive.description import archive_record, readme
+from walkers.errors import input_error
 from walkers.extras import require
 from walkers.files import beside, json_bytes
 from walkers.runner.manifest import FileChanged
@@ -60,17 +60,17 @@ def write_archive(
     if to is None:
         to = Path(f"{contents.name}.zip")
     if to.suffix != ".zip" or to.is_dir():
-        raise refused("to", f"expected the name of a .zip file, not {to}")
+        raise input_error("to", f"expected the name of a .zip file, not {to}")
     files = {
-        README_FILE: File.of(readme(contents, authors, licence).encode()),
-        RECORD_FILE: File.of(json_bytes(record_of(contents, authors, licence))),
+        README_FILE: ArchiveFile.of(readme(contents, authors, licence).encode()),
+        RECORD_FILE: ArchiveFile.of(json_bytes(archive_record(contents, authors, licence))),
         **contents.files,
     }
     sums = "".join(f"{file.sha256}  {place}\n" for place, file in files.items())
     # One date for all files: the same runs give the same bytes.
     date = datetime.fromisoformat(contents.finished).timetuple()[:6]
     with beside(to) as new, zipfile.ZipFile(new, "w") as archive:
-        _write(archive, zipfile.ZipInfo(SUMS_NAME, date), File.of(sums.encode()))
+        _write(archive, zipfile.ZipInfo(SUMS_NAME, date), ArchiveFile.of(sums.encode()))
         for place, file in files.items():
             _write(archive, zipfile.ZipInfo(place, date), file)
     return to
@@ -78,14 +78,14 @@ def write_archive(
 
 def _check(authors: Sequence[str], licence: str | None) -> None:
     if isinstance(authors, str):
-        raise refused("authors", f"expected a list of names, not the text {authors}")
+        raise input_error("authors", f"expected a list of names, not the text {authors}")
     if not all(name.strip() for name in authors):
-        raise refused("authors", "expected names that are not empty")
+        raise input_error("authors", "expected names that are not empty")
     if licence is not None and not licence.strip():
-        raise refused("licence", "expected a licence such as CC-BY-4.0")
+        raise input_error("licence", "expected a licence such as CC-BY-4.0")
 
 
-def _write(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, file: File) -> None:
+def _write(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, file: ArchiveFile) -> None:
     """Write a file, and compare the written bytes with its checksum."""
     entry.compress_type = zipfile.ZIP_DEFLATED
     entry.external_attr = 0o100644 << 16

@@ -17,8 +17,8 @@ from walkers.extras import require
 from walkers.inputs.axes import unit_cube
 from walkers.progress import progress_of
 from walkers.runner.failures import BeadsLost, BlowUp
-from walkers.sweeps.scheduler import Failure, Options, run_sweep
-from walkers.sweeps.table import load
+from walkers.sweeps.scheduler import Failure, SweepOptions, run_sweep
+from walkers.sweeps.table import load_table
 
 PROPOSED = (
     "highest posterior",
@@ -67,7 +67,7 @@ class Outcome:
 def calibrate(
     calibration: Calibration,
     out: Path,
-    options: Options,
+    options: SweepOptions,
     *,
     progress: bool | None = False,
     engine: str | None = None,
@@ -126,7 +126,10 @@ def _numbers(
     calibration: Calibration, labels: Sequence[str], sweep: Path, failed: list[Failure]
 ) -> FloatArray:
     """The observations of the sets of a sweep, shape (P, K); NaN for those of runs that failed, or are none of it."""
-    table, undone = load(sweep), [failure for failure in failed if failure.reason not in FINAL]
+    table, undone = (
+        load_table(sweep),
+        [failure for failure in failed if failure.reason not in FINAL],
+    )
     if undone or not table["status"].isin(("finished", "failed")).all():
         message = undone[0].message if undone else "another process is running them"
         raise CalibrationStopped(

@@ -18,17 +18,17 @@ from scipy.stats import truncnorm, uniform
 from walkers.arrays import FloatArray
 from walkers.calibration.observations import Names, Observation
 from walkers.errors import InputError, Problem, suggestion
-from walkers.inputs.config_table import Table, changed
+from walkers.inputs.config_table import ConfigTable, changed
 from walkers.inputs.keys import Value, flatten
 from walkers.inputs.messages import validated
 from walkers.inputs.reading import find_input
-from walkers.inputs.sweep import Sweep, expand
+from walkers.inputs.sweep import SweepDefinition, expand
 from walkers.inputs.tables.case import CaseFile
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import Number, Whole
 
 
-class Parameter(Table):
+class Parameter(ConfigTable):
     """``[parameters.NAME]``: keys of the case that take the value in some experiments (default: all), and the prior.
 
     The prior is even over the ``range``, or over its logarithm (``log``), or the part of a ``normal`` distribution in
@@ -83,7 +83,7 @@ class Parameter(Table):
         return np.asarray(self._prior.cdf(np.log(values) if self.log else values))
 
 
-class DesignTable(Table):
+class DesignTable(ConfigTable):
     """``[design]``: numbers of parameter sets for the emulators and of points for the posterior; groups to predict."""
 
     seed: Annotated[Whole, Field(ge=0)] = 1
@@ -92,7 +92,7 @@ class DesignTable(Table):
     held_out: list[str] = Field([])
 
 
-class CalibrationFile(Table):
+class CalibrationFile(ConfigTable):
     """A calibration file; ``published`` is what tables and figures call the observations, instead of measured."""
 
     title: str = ""
@@ -139,7 +139,7 @@ class Calibration:
 
     def sweep(
         self, name: str, values: FloatArray | None = None, experiments: Collection[str] = ()
-    ) -> Sweep:
+    ) -> SweepDefinition:
         """The sweep of experiments (default: all), for every parameter set (N, D) or with the case's own values."""
         points = [
             {**self.experiments[label], **self._changes(label, row)}

@@ -16,12 +16,12 @@ import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
 from walkers.arrays import FloatArray
-from walkers.inputs.config_table import Table
-from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Kind, Number, parse_quantity
+from walkers.inputs.config_table import ConfigTable
+from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Number, QuantityKind, parse_quantity
 from walkers.postprocess.measure.gait import settled_samples
-from walkers.postprocess.measure.results import Results, read
+from walkers.postprocess.measure.results import Results, read_results
 from walkers.postprocess.measure.sides import SEPARATED
-from walkers.runner.directory import case_of
+from walkers.runner.run_directory import case_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,7 +46,7 @@ LEAST_SPEED = 5e-5
 Names = Annotated[list[str], Field(min_length=1)]
 
 
-class Observation(Table):
+class Observation(ConfigTable):
     """``[[observations]]``: a fact, where it was found, and the number that it is about.
 
     The number is the mean of a quantity (`Speed`, `Slip` or `Angle`) over the experiments ``of``, or its ratio to the
@@ -81,7 +81,7 @@ class Observation(Table):
         kind = (
             None
             if validation.data.get("over")
-            else kind_of(validation.data.get("quantity", "velocity"))
+            else observation_kind(validation.data.get("quantity", "velocity"))
         )
         if isinstance(value, str) == (kind is None):
             raise ValueError(
@@ -100,7 +100,7 @@ class Observation(Table):
     @property
     def unit(self) -> tuple[str, float]:
         """Unit for tables, and the factor to it."""
-        kind = None if self.over else kind_of(self.quantity)
+        kind = None if self.over else observation_kind(self.quantity)
         return ("mm/s", 1e3) if kind is SPEED else ("°" if kind is ANGLE else "", 1.0)
 
     @property
@@ -131,7 +131,11 @@ class Observation(Table):
         if not self.over:
             return mean
         below = float(np.mean([numbers[label][self.quantity] for label in self.over]))
-        return nan if kind_of(self.quantity) is SPEED and abs(below) < LEAST_SPEED else mean / below
+        return (
+            nan
+            if observation_kind(self.quantity) is SPEED and abs(below) < LEAST_SPEED
+            else mean / below
+        )
 
     def residual(self, number: float) -> float:
         """How far a number is from what the fact allows, in deviations; NaN for NaN."""
@@ -142,14 +146,14 @@ class Observation(Table):
         return abs(self.residual(number)) <= 1.0
 
 
-def kind_of(quantity: str) -> Kind | None:
+def observation_kind(quantity: str) -> QuantityKind | None:
     """The kind of a quantity; None if it is a plain number."""
     return SPEED if quantity in get_args(Speed) else ANGLE if quantity in get_args(Angle) else None
 
 
 def numbers_of(run: str | Path) -> dict[str, float]:
     """All quantities of the finished run of a dimer; NaN where no walker is steady and keeps its beads together."""
-    results = read(run)
+    results = read_results(run)
     walkers, kept = results.table("walkers"), steady_walkers(results)
     numbers = NO_NUMBERS | {name: float(kept[name].mean()) for name in get_args(Speed)}
     if len(kept):
@@ -163,7 +167,7 @@ def numbers_of(run: str | Path) -> dict[str, float]:
 
         for bead, name in enumerate(get_args(Slip), 1):
             numbers[name] = float(np.sqrt(square(f"sliding_{bead}") / square("velocity")))
-    if len(angles := misalignment(walkers[together(walkers)])):
+    if len(angles := misalignment(walkers[keeps_beads_together(walkers)])):
         numbers |= {"largest_angle": float(angles.max()), "smallest_angle": float(angles.min())}
     return numbers
 
@@ -181,7 +185,7 @@ def misalignment(walkers: pd.DataFrame) -> FloatArray:
     return angles
 
 
-def together(walkers: pd.DataFrame) -> pd.Series[bool]:
+def keeps_beads_together(walkers: pd.DataFrame) -> pd.Series[bool]:
     """Whether the beads of walkers of a table ``walkers`` stay together."""
     return walkers["separated_fraction"] < SEPARATED
 
@@ -192,7 +196,7 @@ def steady_walkers(results: Results) -> pd.DataFrame:
     Symmetric dimers, which do not walk and turn across the axis, need only stay together.
     """
     walkers = results.table("walkers")
-    kept = together(walkers)
+    kept = keeps_beads_together(walkers)
     if results.get("sin_delta") != 0.0:
         kept &= walkers["steady"] & (walkers["orientation_end"].abs() < ASTRAY)
     return walkers.loc[kept]

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-RECORD_NAME = "calibration.json"
+CALIBRATION_NAME = "calibration.json"
 _ENDS = (0.05, 0.5, 0.95)
 
 
@@ -35,12 +35,12 @@ def write_outcome(outcome: Outcome, to: Path) -> list[Path]:
     import pandas as pd
 
     to.mkdir(parents=True, exist_ok=True)
-    record, calibration = record_of(outcome), outcome.calibration
+    record, calibration = calibration_record(outcome), outcome.calibration
     samples = pd.DataFrame(
         calibration.values(outcome.posterior.samples), columns=[*calibration.file.parameters]
     )
     files = [
-        to / file for file in ("posterior.parquet", RECORD_NAME, "calibration.md", "best.toml")
+        to / file for file in ("posterior.parquet", CALIBRATION_NAME, "calibration.md", "best.toml")
     ]
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
@@ -73,7 +73,7 @@ def _short(value: float) -> float:
     return float(f"{value:.4g}")  # more digits than the facts determine
 
 
-def record_of(outcome: Outcome) -> dict[str, Any]:
+def calibration_record(outcome: Outcome) -> dict[str, Any]:
     """Contents of ``calibration.json``; observations in mm/s and degrees."""
     calibration, parameters = outcome.calibration, outcome.calibration.file.parameters
     samples = dict(zip(parameters, calibration.values(outcome.posterior.samples).T, strict=True))
@@ -117,8 +117,8 @@ def record_of(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def summary(record: Mapping[str, Any]) -> str:
-    """The facts that agree at each set, and the interval of each parameter, from `record_of`."""
+def calibration_summary(record: Mapping[str, Any]) -> str:
+    """The facts that agree at each set, and the interval of each parameter, from `calibration_record`."""
     agree = [
         [name, f"{count} of {record['of']} {record['observed']} facts agree within their deviation"]
         for name, count in record["agree"].items()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 
-from walkers.errors import refused, suggestion
+from walkers.errors import input_error, suggestion
 from walkers.inputs.reading import shipped
 from walkers.inputs.resolving.library import HALF, Library, LibraryNumber, read_library, unmeasured
 from walkers.inputs.toml import read_toml
@@ -89,7 +89,7 @@ def _of_library(library: Library) -> Iterator[Entry]:
             )
 
 
-def describe(entries: Sequence[Entry]) -> str:
+def catalogue_text(entries: Sequence[Entry]) -> str:
     """All names as tables; names of other files are marked."""
     lines = []
     for kind, columns in _COLUMNS.items():
@@ -131,7 +131,7 @@ def describe_one(entries: Sequence[Entry], name: str) -> str:
     matching = [entry for entry in entries if entry.name.casefold() == name.casefold()]
     if not matching:
         near = suggestion(name, (entry.name for entry in entries))
-        raise refused(name, f"not in the library{near or '; walkers library lists it'}")
+        raise input_error(name, f"not in the library{near or '; walkers library lists it'}")
     # A material, and the pairs that it is part of.
     pairs = [entry for entry in entries if entry.kind == "surface pairs"]
     matching += [pair for pair in pairs if matching[0].name in pair.name.split(" on ")]

@@ -24,7 +24,7 @@ from walkers.commands.options import (
     refuse,
     tell,
 )
-from walkers.errors import refused
+from walkers.errors import input_error
 
 if TYPE_CHECKING:
     from walkers.second_engine.lines import Line
@@ -58,9 +58,9 @@ def engine(*, only: list[str] | None = None, as_json: Json = False, engine: Engi
 
 
 def _print_checked(lines: Sequence[Line], as_json: bool, of: str = "", **more: Any) -> int:
-    from walkers.second_engine.lines import as_dict, as_text, failures
+    from walkers.second_engine.lines import as_dict, failures, lines_text
 
-    print_as(as_json, lambda: as_dict(lines, **more), lambda: as_text(lines, of))
+    print_as(as_json, lambda: as_dict(lines, **more), lambda: lines_text(lines, of))
     return 1 if failures(lines) else 0
 
 
@@ -99,7 +99,7 @@ def case(
         Piles: number of random starts.
     """
     from walkers.runs.names import find
-    from walkers.second_engine.crosscheck import crosscheck, shortened
+    from walkers.second_engine.crosscheck import crosscheck, with_cycles
     from walkers.second_engine.engine import TERMS
 
     loaded = find(case, at.out, at.values).case
@@ -111,9 +111,9 @@ def case(
     for term in without or ():
         refuse(f"--without {term}", term not in TERMS, f"expected one of {', '.join(TERMS)}")
     try:
-        loaded = loaded if cycles is None else shortened(loaded, cycles)
+        loaded = loaded if cycles is None else with_cycles(loaded, cycles)
     except ValueError as error:
-        raise refused("--cycles", str(error)) from error
+        raise input_error("--cycles", str(error)) from error
     lines = crosscheck(loaded, at.out, without or (), seeds=seeds, progress=True, engine=engine)
     return _print_checked(lines, as_json, case=loaded.name, without=without or [])
 
@@ -126,10 +126,10 @@ def library(name: Annotated[str | None, Parameter(name="NAME")] = None, /) -> No
     name
         A material, a liquid, a bridge law, a case, a sweep or a calibration.
     """
-    from walkers.commands.catalogue import catalogue, describe, describe_one
+    from walkers.commands.catalogue import catalogue, catalogue_text, describe_one
 
     entries = catalogue()
-    print(describe_one(entries, name) if name else describe(entries))
+    print(describe_one(entries, name) if name else catalogue_text(entries))
 
 
 def calibrate(
@@ -147,12 +147,12 @@ def calibrate(
     calibration
         A calibration file, or the name of a shipped calibration such as ruby.
     """
-    from walkers.calibration.report import RECORD_NAME, summary, write_outcome
+    from walkers.calibration.report import CALIBRATION_NAME, calibration_summary, write_outcome
     from walkers.files import read_json
 
     outcome = walkers.calibrate(calibration, out, jobs=jobs, progress=True, engine=engine)
     tell(*(f"{name}: {len(failures)} points failed" for name, failures in outcome.failures.items()))
     files = write_outcome(outcome, out / outcome.calibration.name)
-    print(summary(read_json(out / outcome.calibration.name / RECORD_NAME)))
+    print(calibration_summary(read_json(out / outcome.calibration.name / CALIBRATION_NAME)))
     print_lines(files)
     return 0  # a set whose run fails is an outcome: it counts as far off

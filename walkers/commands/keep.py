@@ -15,10 +15,10 @@ from walkers import DEFAULT_OUT
 from walkers.api import Export, directory_of, writer_of
 from walkers.commands.options import At, Out, RunOrSweep, refuse, tell
 from walkers.errors import apply_all
-from walkers.runner.directory import UNFINISHED
+from walkers.runner.run_directory import UNFINISHED
 from walkers.runs.by_hand import as_run, write_folder
 from walkers.runs.names import find
-from walkers.runs.removal import Removal, describe, remove, unfinished_in
+from walkers.runs.removal import Removal, removal_text, remove, unfinished_in
 from walkers.sweeps.removal import named_in
 from walkers.templates.deck import RUN_NAME, render_deck, whole
 
@@ -29,7 +29,7 @@ _REMOVED = (
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Options:
+class ExportOptions:
     """Options of exports.
 
     Parameters
@@ -57,7 +57,7 @@ def export(
     form: Annotated[Export, Parameter("--to")],
     to: Annotated[Path | None, Parameter("-o", metavar="PATH")] = None,
     at: At = At(),
-    options: Options = Options(),
+    options: ExportOptions = ExportOptions(),
 ) -> None:
     """Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, or an archive to publish.
 
@@ -102,7 +102,7 @@ def clean(
         Do not ask for confirmation.
     """
     removals = _removals(runs, out)
-    print(describe(removals))
+    print(removal_text(removals))
     if not removals:
         return 0
     if not yes:

@@ -62,7 +62,7 @@ def list_(
     if where:
         shown = select([entry for entry in contents if entry.kind == "run"], where)
         hidden = 0
-    print_as(as_json, lambda: listing.as_json(shown), lambda: listing.as_text(shown, hidden))
+    print_as(as_json, lambda: listing.as_json(shown), lambda: listing.listing_text(shown, hidden))
 
 
 def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:

@@ -15,7 +15,7 @@ from cyclopts.validators import Number
 from cyclopts.validators import Path as OfPath
 
 from walkers import DEFAULT_OUT, RECORDS
-from walkers.errors import refused
+from walkers.errors import input_error
 
 if TYPE_CHECKING:
     from cyclopts.completion import CompletionContext
@@ -102,7 +102,7 @@ class At:
 def _check_engine(_: object, name: str | None) -> None:
     """Refuse a binary that is not on this machine before anything is done."""
     if name and shutil.which(name) is None:
-        raise refused(f"--engine {name}", "expected the name or path of a liggghts binary")
+        raise input_error(f"--engine {name}", "expected the name or path of a liggghts binary")
 
 
 Engine = Annotated[
@@ -113,13 +113,13 @@ Engine = Annotated[
 def refuse(option: str, wrong: bool, why: str) -> None:
     """Raise an `InputError` with the reason if an option is ``wrong``."""
     if wrong:
-        raise refused(option, why)
+        raise input_error(option, why)
 
 
 def refuse_any(given: dict[str, Any], why: str) -> None:
     """Raise an `InputError` with the reason if one of these options is given."""
     if option := next((name for name, value in given.items() if value), None):
-        raise refused(f"--{option.replace('_', '-')}", why)
+        raise input_error(f"--{option.replace('_', '-')}", why)
 
 
 def print_as(as_json: bool, value: Callable[[], Any], text: Callable[[], str]) -> None:

@@ -61,7 +61,7 @@ def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = 
         Print the theory's prediction, with the result of the run if it exists.
     """
     if theory:
-        from walkers.theory.prediction import describe as describe_prediction
+        from walkers.theory.prediction import prediction_text as describe_prediction
 
         predicted = walkers.predict(case, at.out, at.values)
         print_as(
@@ -69,10 +69,10 @@ def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = 
         )
         return
     from walkers.runs.names import find
-    from walkers.runs.preview import describe, summarise
+    from walkers.runs.preview import preview_text, summarise
 
     summary = summarise(find(case, at.out, at.values).case)
-    print_as(as_json, lambda: summary, lambda: describe(summary))
+    print_as(as_json, lambda: summary, lambda: preview_text(summary))
 
 
 def _draws(spread: bool, points: int | None) -> int:
@@ -114,7 +114,7 @@ def run(
     from walkers.runs.names import find
     from walkers.runs.preview import notes
     from walkers.sweeps.accuracy import times_of
-    from walkers.sweeps.spread import describe, spread_sweep
+    from walkers.sweeps.spread import spread_sweep, spread_text
 
     refuse("CASE", not cases, "expected a case, such as fig1b")
     draws = _draws(spread, points)
@@ -156,7 +156,7 @@ def run(
                 )
             )
         else:
-            print_lines([done.describe(), *([describe(band)] if band else [])])
+            print_lines([done.describe(), *([spread_text(band)] if band else [])])
     return 1 if failed else 0
 
 
@@ -192,7 +192,7 @@ def sweep(
     """
     from walkers.inputs.sweep import load_sweep
     from walkers.postprocess.measure.uncertainty import lines_of_rest, rests_on
-    from walkers.sweeps.scheduler import Options, plan_sweep
+    from walkers.sweeps.scheduler import SweepOptions, plan_sweep
     from walkers.sweeps.site import load_site
     from walkers.sweeps.spread import spread_sweep
 
@@ -207,7 +207,7 @@ def sweep(
         duration = duration_text(len(loaded.rows) / _RESOLVED_PER_SECOND)
         tell(f"{loaded.name}: resolving {len(loaded.rows)} points, which takes about {duration}")
     if dry_run:
-        options = Options(jobs, load_site(site) if site else None)
+        options = SweepOptions(jobs, load_site(site) if site else None)
         with progress_of(loaded.name) as advance:
             plan = plan_sweep(loaded, at.out, options, engine, advance)
         print(plan.as_text())

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkers.arrays import FloatArray
-from walkers.errors import unusable
+from walkers.errors import key_error
 from walkers.inputs.keys import DISTRIBUTIONS, SPACINGS, Value, flatten
 from walkers.inputs.units import as_quantity
 
-MOST_POINTS = 1_000_000
+MOST_POINTS_OF_SWEEP = 1_000_000
 
 
 class Range(NamedTuple):
@@ -59,7 +59,7 @@ def values_of(key: str, axis: object) -> list[Value]:
     """The values of an axis: a list, ``{ linspace = [first, last, number] }`` or ``{ geomspace = [...] }``."""
     if isinstance(axis, list):
         if not axis:
-            raise unusable(key, "expected at least one value", axis)
+            raise key_error(key, "expected at least one value", axis)
         unit_of(key, axis)
         return axis
     kind, given = (
@@ -67,15 +67,15 @@ def values_of(key: str, axis: object) -> list[Value]:
     )
     if kind not in SPACINGS:
         message = "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
-        raise unusable(key, message, axis)
+        raise key_error(key, message, axis)
     if not (
         isinstance(given, list)
         and len(given) == 3
         and type(given[2]) is int
-        and 1 <= given[2] <= MOST_POINTS
+        and 1 <= given[2] <= MOST_POINTS_OF_SWEEP
     ):
         message = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
-        raise unusable(key, message, axis)
+        raise key_error(key, message, axis)
     (first, last), unit = _numbers(key, given[:2], positive=kind == "geomspace")
     numbers = [written(float(number), unit) for number in getattr(np, kind)(first, last, given[2])]
     # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
@@ -87,21 +87,21 @@ def _numbers(key: str, given: list[Value], *, positive: bool) -> tuple[list[floa
     """The numbers of a range and their unit."""
     unit, numbers = unit_of(key, given), [number_of(key, value) for value in given]
     if positive and min(numbers) <= 0:
-        raise unusable(key, "expected values above zero", given)
+        raise key_error(key, "expected values above zero", given)
     return numbers, unit
 
 
 def number_of(key: str, value: Value) -> float:
     """The number of a value, without its unit; raises `InputError` if it is not a finite number."""
     if (quantity := as_quantity(value)) is None:
-        raise unusable(key, "expected a number, or a number with its unit in quotes", value)
+        raise key_error(key, "expected a number, or a number with its unit in quotes", value)
     return quantity[0]
 
 
-def plain(value: Value) -> Any:
+def without_unit(value: Value) -> Any:
     """A value, or the values of a list, without unit: a number where it is a quantity, else as it is."""
     if isinstance(value, list):
-        return [*map(plain, value)]
+        return [*map(without_unit, value)]
     quantity = as_quantity(value) if isinstance(value, str) else None
     return quantity[0] if quantity else value
 
@@ -117,7 +117,7 @@ def unit_of(key: str, values: Sequence[Value]) -> str | None:
     parts = [part for value in values for part in (value if isinstance(value, list) else [value])]
     units = {quantity[1] for quantity in map(as_quantity, parts) if quantity}
     if len(units) > 1:
-        raise unusable(key, "expected one unit throughout", list(values))
+        raise key_error(key, "expected one unit throughout", list(values))
     return units.pop() if units else None
 
 
@@ -130,7 +130,7 @@ def listed(key: str, given: object) -> Axis:
             [as_quantity(part) or part for part in (value if isinstance(value, list) else [value])]
         )
         if same in occurred:
-            raise unusable(key, "expected different values: this one occurs twice", value)
+            raise key_error(key, "expected different values: this one occurs twice", value)
         occurred.add(same)
     return Axis.of({key: values})
 
@@ -144,12 +144,12 @@ def zipped(table: Mapping[str, Any]) -> Axis:
     """An axis of keys that vary together, first value with first value."""
     columns = {key: values_of(key, axis) for key, axis in flatten(table).items()}
     if not columns:
-        raise unusable("zip", "expected keys and their values", dict(table))
+        raise key_error("zip", "expected keys and their values", dict(table))
     lengths = {key: len(values) for key, values in columns.items()}
     if len(set(lengths.values())) > 1:
         *_, (key, values) = columns.items()
         message = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise unusable(key, f"expected as many values for each key of a zip: {message}", values)
+        raise key_error(key, f"expected as many values for each key of a zip: {message}", values)
     return Axis.of(columns)
 
 
@@ -165,7 +165,7 @@ def sampled(points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
     """Points of Sobol's sequence, scrambled with the seed, in the ranges of several keys (`ranges_of`)."""
     ends = ranges_of(ranges)
     if not ends:
-        raise unusable("sample.ranges", "expected keys and their ranges", dict(ranges))
+        raise key_error("sample.ranges", "expected keys and their ranges", dict(ranges))
     shares = zip(unit_cube(len(ends), points, seed).T, ends.items(), strict=True)
     drawn = ((key, span.unit, span.at(share).tolist()) for share, (key, span) in shares)
     return Axis.of(
@@ -177,9 +177,9 @@ def descending(key: str, ends: Mapping[str, Value]) -> Axis:
     """An axis of a key from a value down to another in steps; ``ends`` has the three by their keys in a sweep file."""
     start, to, step = (number_of(name, value) for name, value in ends.items())
     unit = unit_of(key, list(ends.values()))
-    if not (start >= to and step > 0 and start - to < MOST_POINTS * step):
+    if not (start >= to and step > 0 and start - to < MOST_POINTS_OF_SWEEP * step):
         first, last, _ = ends.values()
-        raise unusable(
+        raise key_error(
             "descend",
             "`from` must not be below `to`, and `step` must be positive",
             f"{first} to {last}",
@@ -200,7 +200,7 @@ def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
             spans[key] = range_of(key, given)
         except NotARange as error:
             message = "expected { uniform = [low, high] } or { loguniform = [low, high] }"
-            raise unusable(key, message, given) from error
+            raise key_error(key, message, given) from error
     return spans
 
 
@@ -229,7 +229,7 @@ def range_of(key: str, given: object) -> Range:
     logarithmic = distribution == "loguniform"
     (low, *median, high), unit = _numbers(key, ends, positive=logarithmic)
     if low >= high or not all(low <= middle <= high for middle in median):
-        raise unusable(key, "expected the smaller value first", given)
+        raise key_error(key, "expected the smaller value first", given)
     return Range(low, high, unit, logarithmic, *median)
 
 
@@ -253,9 +253,9 @@ def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Valu
             earlier in (key, list_of) or earlier.partition("[")[0] == key
             for earlier in keys[:number]
         ):
-            raise unusable(key, "varies on two axes; expected one")
-    if (many := prod(len(axis.rows) for axis in axes)) > MOST_POINTS:
-        raise unusable("axes", f"{many} points; expected at most {MOST_POINTS}")
+            raise key_error(key, "varies on two axes; expected one")
+    if (many := prod(len(axis.rows) for axis in axes)) > MOST_POINTS_OF_SWEEP:
+        raise key_error("axes", f"{many} points; expected at most {MOST_POINTS_OF_SWEEP}")
     return keys, [
         tuple(value for row in rows for value in row)
         for rows in product(*(axis.rows for axis in axes))

@@ -10,11 +10,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from walkers.errors import InputError, Problem, apply_all, refused, unusable
+from walkers.errors import InputError, Problem, apply_all, input_error, key_error
 from walkers.inputs.axes import NotARange, range_of
 from walkers.inputs.config_table import alternatives, changed, contradictions
 from walkers.inputs.keys import flatten, value_at
-from walkers.inputs.messages import blaming, check_key, validated
+from walkers.inputs.messages import attributed_to, check_key, validated
 from walkers.inputs.resolving.from_library import NAMES, SUPPLIED, supplied
 from walkers.inputs.resolving.library import library_of
 from walkers.inputs.resolving.steps import resolve
@@ -58,17 +58,17 @@ def build_case(
         If the document or a change is invalid, with all problems of the step that detects the first.
     """
     if changes:
-        with blaming(source):
+        with attributed_to(source):
             apply_all(lambda key: check_key(CaseFile, key), changes)
             document = changed(CaseFile, document, changes)
-    with blaming(source, document):
+    with attributed_to(source, document):
         document = _with_record(with_files(document))
         tables, sources, unknown = supplied(document, library_of(document, source))
         file = _validated(tables, unknown, source)
         try:
             case = resolve(file, name=name, document=document, sources=sources)
         except ArithmeticError as error:
-            raise refused(source, f"inconsistent values: {error}") from error
+            raise input_error(source, f"inconsistent values: {error}") from error
         _check_uncertain(case, tables, source, around=around)
     return case
 
@@ -155,20 +155,20 @@ def _check_uncertain(case: Case, tables: Mapping[str, Any], source: str, *, arou
             low, high = _ends_of_range(name, case.uncertain[name], tables, source)
         except NotARange as error:
             message = "expected [low, high] or { loguniform = [low, high] }"
-            raise unusable(place, message, written[name]) from error
+            raise key_error(place, message, written[name]) from error
         except InputError as error:  # of the key or of an end of its range
-            raise unusable(place, error.problems[0].expected, written[name]) from error
+            raise key_error(place, error.problems[0].expected, written[name]) from error
         value = case.value_of(name)
         if value is None:
             instead = sorted(key for key in alternatives(CaseFile, name) if case.value_of(key))
             if instead:
                 message = f"expected {' or '.join(instead)}, which the case has instead"
-                raise unusable(place, message, written[name])
+                raise key_error(place, message, written[name])
         slack = 1e-9 * (high - low)
         if around and isinstance(value, (int, float)) and not low - slack <= value <= high + slack:
             text = next((origin.text for origin in case.origins if origin.key == name), str(value))
             message = f"expected a range that holds the case's own value, {text}"
-            raise unusable(place, message, written[name])
+            raise key_error(place, message, written[name])
 
     apply_all(check, case.uncertain)
 
@@ -182,7 +182,7 @@ def _ends_of_range(
     """The ends of the range of an uncertain key, in SI units."""
     check_key(CaseFile, name)
     if range_of(name, given).median is not None:
-        raise unusable(name, "expected [low, high]: the case's own value is the median")
+        raise key_error(name, "expected [low, high]: the case's own value is the median")
     (ends,) = given.values()
     documents = (changed(CaseFile, tables, {name: end}) for end in ends)
     low, high = (validated(CaseFile, document, source) for document in documents)

@@ -12,12 +12,12 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, PydanticUndefined
 
-from walkers.errors import Problem, shown, unusable
+from walkers.errors import Problem, key_error, quoted
 from walkers.inputs.keys import joined, parts_of
 from walkers.inputs.units import WRITTEN, is_auto, kind_in
 
 T = TypeVar("T")
-Completed = TypeVar("Completed", bound="Table")
+Completed = TypeVar("Completed", bound="ConfigTable")
 SAME_RUN = "same run"
 """Annotation of a key: another value does not make another run, by itself."""
 _TYPES: Mapping[Any, str] = {
@@ -76,7 +76,7 @@ class Choice:
         return {key for names in without for key in names}
 
 
-class Table(BaseModel):
+class ConfigTable(BaseModel):
     """A table of a file. Its fields are the keys; values are in SI units; unknown keys are refused."""
 
     model_config = ConfigDict(
@@ -101,24 +101,26 @@ class Table(BaseModel):
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and self._values == other._values
 
-    def but(self, **values: Any) -> Self:
+    def with_values(self, **values: Any) -> Self:
         """The same table with other values, which are not validated."""
         table = self.model_copy(update=values)
         for name in table.__dict__.keys() - type(self).model_fields.keys():
             del table.__dict__[name]  # cached properties of the former values
         return table
 
-    def put(self, name: str, value: Any) -> Self:
+    def with_value_at(self, name: str, value: Any) -> Self:
         """The same tables with another value at a dotted key, which is not validated."""
         first, *rest = parts_of(name)
         if not rest:
-            return self.but(**{str(first): value})
+            return self.with_values(**{str(first): value})
         below = getattr(self, str(first))
         if isinstance(below, tuple):
             number, *inner = rest
-            new = below[int(number)].put(joined(inner), value) if inner else value
-            return self.but(**{str(first): (*below[: int(number)], new, *below[int(number) + 1 :])})
-        return self.but(**{str(first): below.put(joined(rest), value)})
+            new = below[int(number)].with_value_at(joined(inner), value) if inner else value
+            return self.with_values(
+                **{str(first): (*below[: int(number)], new, *below[int(number) + 1 :])}
+            )
+        return self.with_values(**{str(first): below.with_value_at(joined(rest), value)})
 
     def completed(self, model: type[Completed], values: Mapping[str, Any]) -> Completed:
         """The table as a model that narrows this one.
@@ -145,7 +147,7 @@ class Table(BaseModel):
             if isinstance(part, int):
                 value = value[part] if isinstance(value, tuple) and part < len(value) else None
             else:
-                has_key = isinstance(value, Table) and part in type(value).model_fields
+                has_key = isinstance(value, ConfigTable) and part in type(value).model_fields
                 value = getattr(value, part) if has_key else None
         return value
 
@@ -153,9 +155,9 @@ class Table(BaseModel):
         """Values of all keys, tables in tables by dotted keys, each with its field; without derived fields."""
         for name, field in keys_in(type(self)).items():
             value, place = getattr(self, name), f"{prefix}{name}"
-            if isinstance(value, Table):
+            if isinstance(value, ConfigTable):
                 yield from value.leaves(f"{place}.")
-            elif isinstance(value, tuple) and value and isinstance(value[0], Table):
+            elif isinstance(value, tuple) and value and isinstance(value[0], ConfigTable):
                 for number, entry in enumerate(value):
                     yield from entry.leaves(f"{place}[{number}].")
             else:
@@ -170,9 +172,9 @@ class Table(BaseModel):
         for name, field in type(self).model_fields.items():
             if SAME_RUN in field.metadata or (value := getattr(self, name)) in (None, ()):
                 continue
-            several = isinstance(value, tuple) and isinstance(value[0], Table)
+            several = isinstance(value, tuple) and isinstance(value[0], ConfigTable)
             kept[name] = [entry.determinants() for entry in value] if several else value
-            if isinstance(value, Table):
+            if isinstance(value, ConfigTable):
                 kept[name] = value.determinants()
         return kept
 
@@ -193,7 +195,7 @@ class Table(BaseModel):
         if len(begun) > 1:
             name = next(name for name in begun[1] if name in given)
             two = " or ".join(map(" and ".join, begun[:2]))
-            yield Problem(within(place, name), None, f"expected either {two}, not both")
+            yield Problem(key_within(place, name), None, f"expected either {two}, not both")
         elif begun or choice.required:
             expected = begun[0] if begun else choice.expressions[0]
             instead = [
@@ -209,7 +211,7 @@ class Table(BaseModel):
     def missing(cls, name: str, place: str, instead: str = "") -> Problem:
         """The problem of a missing key of a table at a place, with an example, and alternatives."""
         return Problem(
-            within(place, name),
+            key_within(place, name),
             None,
             f"missing; expected {example_of(cls.model_fields[name])}{instead}",
         )
@@ -218,11 +220,11 @@ class Table(BaseModel):
 def present(value: T | None, name: str) -> T:
     """A value of a dotted key that the choices of its table require; raises `InputError` if it is missing."""
     if value is None:
-        raise unusable(name, "missing")
+        raise key_error(name, "missing")
     return value
 
 
-def within(place: str, name: str) -> str:
+def key_within(place: str, name: str) -> str:
     """The dotted key of a key of a table at a place."""
     return f"{place}.{name}".removeprefix(".")
 
@@ -248,9 +250,9 @@ def keys_of(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     return keys
 
 
-def table_in(annotation: Any) -> type[Table] | None:
+def table_in(annotation: Any) -> type[ConfigTable] | None:
     """The table that a field holds, alone, in a tuple or by names."""
-    if isinstance(annotation, type) and issubclass(annotation, Table):
+    if isinstance(annotation, type) and issubclass(annotation, ConfigTable):
         return annotation
     return next((table for inner in get_args(annotation) if (table := table_in(inner))), None)
 
@@ -258,14 +260,14 @@ def table_in(annotation: Any) -> type[Table] | None:
 def example_of(field: FieldInfo) -> str:
     """An example of a value of a key: ``a value such as "80 Hz"``; its type if the field has none."""
     if field.examples:
-        return f"a value such as {shown(field.examples[0])}"
+        return f"a value such as {quoted(field.examples[0])}"
     kind = kind_in([*field.metadata, field.annotation])
     if kind:
         return f'a value such as "{kind.example}"'
     return _TYPES.get(get_origin(field.annotation) or field.annotation, "a value")
 
 
-def contradictions(model: type[Table], document: Any, place: str = "") -> Iterator[Problem]:
+def contradictions(model: type[ConfigTable], document: Any, place: str = "") -> Iterator[Problem]:
     """Contradictions and gaps of the tables of a document (`Table.problems`)."""
     if not isinstance(document, Mapping):
         return
@@ -273,7 +275,7 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
         {name: value for name, value in document.items() if value != []}, place
     )
     for name, below in document.items():
-        field, where = keys_in(model).get(name), within(place, name)
+        field, where = keys_in(model).get(name), key_within(place, name)
         if field is None or (inner := table_in(field.annotation)) is None:
             continue
         for number, entry in enumerate(below if isinstance(below, list) else [below]):
@@ -282,7 +284,7 @@ def contradictions(model: type[Table], document: Any, place: str = "") -> Iterat
             )
 
 
-def alternatives(model: type[Table], name: str) -> set[str]:
+def alternatives(model: type[ConfigTable], name: str) -> set[str]:
     """Dotted keys that a key excludes."""
     *path, last = parts_of(name)
     if path:
@@ -296,7 +298,7 @@ def alternatives(model: type[Table], name: str) -> set[str]:
 
 
 def changed(
-    model: type[Table], document: Mapping[str, Any], changes: Mapping[str, Any]
+    model: type[ConfigTable], document: Mapping[str, Any], changes: Mapping[str, Any]
 ) -> dict[str, Any]:
     """A document with other values at dotted keys (``dimers.radii[0]`` for one of a list).
 
@@ -321,9 +323,9 @@ def _put(tables: dict[str, Any], name: str, value: Any, instead_of: Collection[s
                 message = (
                     f"the base case has no {joined(above)} of that length; expected {expected}"
                 )
-                raise unusable(name, message, value)
+                raise key_error(name, message, value)
         elif isinstance(place, list):
-            raise unusable(
+            raise key_error(
                 name, f"{joined(above)} is a list: say which one, such as {joined(above)}[0]", value
             )
         elif not isinstance(place, dict):  # the base case is wrong there, which its own check tells

@@ -9,7 +9,7 @@ from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
-from walkers.errors import InputError, Problem, unusable
+from walkers.errors import InputError, Problem, key_error
 
 Value = Any
 """A TOML value: text with a unit, a number, or a list of such."""
@@ -54,7 +54,7 @@ def flatten(table: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(value, Mapping) and value and not is_axis(value):
             below = {f"{name}.{key}": leaf for key, leaf in flatten(value).items()}
         if twice := flat.keys() & below.keys():
-            raise unusable(twice.pop(), "is given twice; expected one value")
+            raise key_error(twice.pop(), "is given twice; expected one value")
         flat |= below
     return flat
 

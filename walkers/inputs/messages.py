@@ -11,12 +11,12 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from walkers.errors import InputError, Problem, shown, suggestion, unusable
-from walkers.inputs.config_table import Table, example_of, keys_in, keys_of, table_in
+from walkers.errors import InputError, Problem, key_error, quoted, suggestion
+from walkers.inputs.config_table import ConfigTable, example_of, keys_in, keys_of, table_in
 from walkers.inputs.keys import MISSING, joined, parts_of, value_at
 from walkers.inputs.units import AUTO, WRITTEN
 
-File = TypeVar("File", bound=BaseModel)
+FileModel = TypeVar("FileModel", bound=BaseModel)
 
 _SENTENCES = {
     "greater_than": "expected more than {gt:g}",
@@ -43,24 +43,24 @@ _GIVEN_ELSEWHERE = {"beads": "a material", "liquid": "a liquid", "contact": "sur
 """Entries of the library that give keys of these tables."""
 
 
-def quoted(document: Mapping[str, Any], parts: Sequence[str | int]) -> str | None:
+def quoted_at(document: Mapping[str, Any], parts: Sequence[str | int]) -> str | None:
     """The value at a place of a document, quoted; None if there is none."""
     value = value_at(document, parts)
     if isinstance(value, Mapping) and "rows" in value:  # a record: a case has the name of its file
         value = value.get("file", value)
-    return None if value is MISSING else shown(value)
+    return None if value is MISSING else quoted(value)
 
 
 def _quoting(problems: Iterable[Problem], document: Mapping[str, Any]) -> list[Problem]:
     """Problems with the values at fault as the document has them."""
     return [
-        replace(problem, value=problem.value or quoted(document, parts_of(problem.key)))
+        replace(problem, value=problem.value or quoted_at(document, parts_of(problem.key)))
         for problem in problems
     ]
 
 
 @contextmanager
-def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[None]:
+def attributed_to(source: str, document: Mapping[str, Any] | None = None) -> Iterator[None]:
     """Add to errors that name no source this one, and the value at fault as the document has it."""
     try:
         yield
@@ -71,12 +71,12 @@ def blaming(source: str, document: Mapping[str, Any] | None = None) -> Iterator[
 
 
 def validated(
-    model: type[File],
+    model: type[FileModel],
     document: Mapping[str, Any],
     source: str,
     whole: str = "a case",
     further: Sequence[Problem] = (),
-) -> File:
+) -> FileModel:
     """Nested tables as a kind of file (``whole``); raises `InputError` with all problems, the ``further`` ones too."""
     problems = {problem.key: problem for problem in _quoting(further, document)}
     try:
@@ -145,7 +145,7 @@ def _problem_of(
             message = 'expected { value = ..., source = "..." }'
         if field and AUTO in field.metadata and kind != "value_error":
             message += ', or "auto"'
-    return Problem(key, quoted(document, parts_of(key)), message)
+    return Problem(key, quoted_at(document, parts_of(key)), message)
 
 
 def _place(location: Sequence[str | int], keys: Collection[str]) -> str:
@@ -157,15 +157,15 @@ def _place(location: Sequence[str | int], keys: Collection[str]) -> str:
     return place
 
 
-def check_key(model: type[Table], key: str) -> None:
+def check_key(model: type[ConfigTable], key: str) -> None:
     """Refuse a key that no case has; raises `InputError` if it is one."""
     parts, fields = re.sub(r"\[\d+\]", "", key).split("."), keys_of(model)
     if "" in parts:
-        raise unusable(key, "is not a key of a case; expected one such as drive.frequency")
+        raise key_error(key, "is not a key of a case; expected one such as drive.frequency")
     if (field := fields.get(".".join(parts))) is None:
-        raise unusable(key, _unknown_key(parts, model, "a case"))
+        raise key_error(key, _unknown_key(parts, model, "a case"))
     if table_in(field.annotation):
-        raise unusable(key, "is a table of a case; expected one of its keys")
+        raise key_error(key, "is a table of a case; expected one of its keys")
 
 
 def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from walkers.errors import check_utf8, expected_of, refused
+from walkers.errors import check_utf8, expected_of, input_error
 from walkers.files import write_json
 from walkers.inputs.reading import shipped
 
@@ -33,19 +33,19 @@ def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[
     path = Path(path)
     check_utf8(path)
     if path.name in ("", "..") or path.stem in (".", ".."):
-        raise refused(path, "expected a name")
+        raise input_error(path, "expected a name")
     path = path if path.suffix == ".toml" else path.with_name(f"{path.name}.toml")
     if case not in (cases := shipped("case")):
-        raise refused(case, expected_of(case, cases))
+        raise input_error(case, expected_of(case, cases))
     text = cases[case].read_text("utf-8")
     try:
         _write_new(path, f"#:schema {_SCHEMA}\n\n{text}" if schema else text)
     except FileExistsError as error:
-        raise refused(
+        raise input_error(
             path, "exists already: it is not overwritten; expected another name"
         ) from error
     except OSError as error:
-        raise refused(
+        raise input_error(
             path, f"cannot be written ({error.strerror}): expected a name in a folder that exists"
         ) from error
     if not schema:

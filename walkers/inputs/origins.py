@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-from walkers.inputs.units import Kind, quantity_text
+from walkers.inputs.units import QuantityKind, quantity_text
 
 Whence = Literal["given", "library", "own library", "calibrated", "assumed", "default", "derived"]
 
@@ -55,7 +55,7 @@ class Origin:
         return f"{self.origin}, uncertain" if self.uncertain else self.origin
 
 
-def text_of(value: Any, kind: Kind | None = None) -> str:
+def text_of(value: Any, kind: QuantityKind | None = None) -> str:
     """A value of a case file as text: lists with commas, tables by their keys; numbers of a kind are in SI units."""
     if isinstance(value, (list, tuple)):
         texts = ((text_of(entry, kind), isinstance(entry, (list, tuple))) for entry in value)

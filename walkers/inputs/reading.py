@@ -7,9 +7,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import InputError, check_utf8, refused, shortened, suggestion, unusable
+from walkers.errors import InputError, check_utf8, input_error, key_error, shortened, suggestion
 from walkers.inputs.keys import MISSING, value_at
-from walkers.inputs.messages import blaming
+from walkers.inputs.messages import attributed_to
 from walkers.inputs.resolving.library import FILE_NAME, read_library
 from walkers.inputs.toml import read_toml, with_files
 
@@ -79,12 +79,12 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
     directory if None. A case that has a ``[library]`` itself takes no other.
     """
     document = read_toml(path)
-    with blaming(str(path), document):
+    with attributed_to(str(path), document):
         mesh = value_at(document, ("boundary", "mesh"))
         of_archive = value_at(document, ("meshes", mesh)) is not MISSING  # whose case has its mesh
         for table in {"records", "meshes"} - ({"meshes"} if of_archive else set()):
             if table in document:
-                raise unusable(
+                raise key_error(
                     table,
                     "unknown key: the program reads this table from a file that the case names",
                 )
@@ -111,15 +111,15 @@ def find_input(name: str | Path, kind: str) -> Path:
         if not path.exists() and Path(f"{name}.toml").is_file():
             path = Path(f"{name}.toml")
         if (actual := _kind_of(path)) not in (None, kind):
-            raise refused(name, f"is {_COMMANDS[str(actual)].format(name)}")
+            raise input_error(name, f"is {_COMMANDS[str(actual)].format(name)}")
         if path.exists():
             if path.stem in (".", ".."):  # of "...toml"
-                raise refused(name, "expected a name before .toml")
+                raise input_error(name, "expected a name before .toml")
             return path
     except OSError as error:
-        raise refused(shortened(text), f"cannot be read: {error.strerror}") from error
+        raise input_error(shortened(text), f"cannot be read: {error.strerror}") from error
     missing = "no such file, run or sweep" if kind == "case" else "no such file"
-    raise refused(
+    raise input_error(
         name, f"{missing}, nor a shipped {kind} ({', '.join(of_kind)}){suggestion(text, of_kind)}"
     )
 

@@ -12,22 +12,22 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from walkers.errors import InputError, Problem, apply_all, refused, shortened, unusable
+from walkers.errors import InputError, Problem, apply_all, input_error, key_error, shortened
 from walkers.inputs.axes import (
-    MOST_POINTS,
+    MOST_POINTS_OF_SWEEP,
     Axis,
     combinations,
     crossed,
     descending,
     one_at_a_time,
-    plain,
     sampled,
+    without_unit,
     zipped,
 )
 from walkers.inputs.case_building import build_case
-from walkers.inputs.config_table import Table, alternatives, changed
+from walkers.inputs.config_table import ConfigTable, alternatives, changed
 from walkers.inputs.keys import Value, flatten
-from walkers.inputs.messages import blaming, check_key, validated
+from walkers.inputs.messages import attributed_to, check_key, validated
 from walkers.inputs.reading import find_input, read_case, shipped
 from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.toml import read_toml, with_files
@@ -36,16 +36,16 @@ from walkers.inputs.units import Speed, Whole
 _LONGEST_NAME = 120
 
 
-class SampleTable(Table):
+class SampleTable(ConfigTable):
     """``[[sample]]``: points of Sobol's sequence, best a power of two, over ranges of keys."""
 
     method: Literal["sobol"] = "sobol"
-    points: Annotated[Whole, Field(ge=1, le=MOST_POINTS)]
+    points: Annotated[Whole, Field(ge=1, le=MOST_POINTS_OF_SWEEP)]
     seed: Annotated[Whole, Field(ge=0)] = 1
     ranges: dict[str, Any]
 
 
-class DescendTable(Table):
+class DescendTable(ConfigTable):
     """``[descend]``: a key that is lowered step by step, to find where the walkers stop."""
 
     key: str = "drive.peak_acceleration"
@@ -55,7 +55,7 @@ class DescendTable(Table):
     until_below: Speed = Field(examples=["0.02 mm/s"])
 
 
-class SweepFile(Table):
+class SweepFile(ConfigTable):
     """A sweep file."""
 
     title: str = ""
@@ -79,7 +79,7 @@ class SweepFile(Table):
 
 
 @dataclass(frozen=True, repr=False)
-class Sweep:
+class SweepDefinition:
     """A base case and its variations."""
 
     name: str  # of its file, and of its directory
@@ -102,7 +102,7 @@ class Sweep:
     @cached_property
     def values(self) -> list[tuple[Any, ...]]:
         """The points without units."""
-        return [tuple(map(plain, row)) for row in self.rows]
+        return [tuple(map(without_unit, row)) for row in self.rows]
 
     @cached_property
     def units(self) -> dict[str, str | None]:
@@ -122,16 +122,20 @@ class Sweep:
             changes = dict(zip(self.keys, row, strict=True))
             text = ", ".join(f"{key} = {value}" for key, value in changes.items())
             where = f"{self.source}: point {number} ({text})" if text else self.source
-            with blaming(where):
+            with attributed_to(where):
                 document = changed(CaseFile, self.document, changes)
             case = build_case(document, source=where, name=self.case_name)
             # The title of the base case may not hold here.
-            yield case.but(title=f"{shortened(self.name)}: {shortened(text)}") if text else case
+            yield (
+                case.with_values(title=f"{shortened(self.name)}: {shortened(text)}")
+                if text
+                else case
+            )
 
 
 def load_sweep(
     sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Value] | None = None
-) -> Sweep:
+) -> SweepDefinition:
     """Read a sweep file, a shipped sweep such as ``fig2``, or the tables of a sweep file, and expand it.
 
     ``changes`` are put beside its ``[set]``; its name tells of them. Its points are checked by `Sweep.cases`.
@@ -140,9 +144,9 @@ def load_sweep(
     document, name = dict(sweep) if isinstance(sweep, Mapping) else read_toml(path), path.stem
     source = "<sweep>" if isinstance(sweep, Mapping) else str(sweep)
     if changes:
-        with blaming(source):
+        with attributed_to(source):
             if not isinstance(document.get("set", {}), Mapping):
-                raise unusable("set", "expected a table of keys")
+                raise key_error("set", "expected a table of keys")
             document = {**document, "set": {**flatten(document.get("set", {})), **changes}}
         name = _name_with(name, changes)
     expanded = expand(document, source=source, name=name, folder=path.parent)
@@ -172,7 +176,7 @@ def expand(
     name: str,
     folder: Path = Path(),
     base: tuple[str, Mapping[str, Any]] | None = None,
-) -> Sweep:
+) -> SweepDefinition:
     """Expand a sweep given as nested tables, with files that it names in a ``folder``.
 
     With ``base``, the name of the base case and its tables, no file is read.
@@ -180,15 +184,15 @@ def expand(
     file = validated(SweepFile, document, source, "a sweep")
     path = None if base else _base(file.case, source, folder)
     try:
-        with blaming(source):
+        with attributed_to(source):
             axes, settings = file.all_axes(), flatten(file.set)
             keys, rows = combinations(axes)
             if "title" in keys:
-                raise unusable("title", "expected another key, for title does not determine a run")
+                raise key_error("title", "expected another key, for title does not determine a run")
             apply_all(partial(check_key, CaseFile), (*settings, *keys))
             for key in keys:
                 for alternative in alternatives(CaseFile, key) & {*keys}:
-                    raise unusable(
+                    raise key_error(
                         key, f"expected one of {key} and {alternative}, which replace each other"
                     )
             case_name, given = (path.stem, read_case(path, folder)) if path else base or ("", {})
@@ -202,9 +206,9 @@ def expand(
             tables = changed(CaseFile, given, settings)
             changed(CaseFile, tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
-        raise refused(source, "has infinitely nested tables") from error
+        raise input_error(source, "has infinitely nested tables") from error
     until = file.descend.until_below if file.descend else None
-    return Sweep(name, source, case_name, given, document, tables, axes, rows, until)
+    return SweepDefinition(name, source, case_name, given, document, tables, axes, rows, until)
 
 
 def _base(case: str, source: str, folder: Path) -> Path:
@@ -214,7 +218,7 @@ def _base(case: str, source: str, folder: Path) -> Path:
         beside = (folder / name for name in names if case and (folder / name).is_file())
         base = next(beside, None) or find_input(case or "no name", "case")
         if base.is_dir():
-            raise refused(base, "expected a case file, or the name of a shipped case")
+            raise input_error(base, "expected a case file, or the name of a shipped case")
     except (OSError, InputError) as error:
         why = (
             error.problems[0].expected

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from walkers.errors import refused, unusable
+from walkers.errors import input_error, key_error
 from walkers.files import read_limited
 from walkers.inputs.keys import parts_of, value_at
 
@@ -26,19 +26,19 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         contents = read_limited(path, _MOST_BYTES)
     except ValueError as error:
-        raise refused(path, str(error)) from error
+        raise input_error(path, str(error)) from error
     except OSError as error:
-        raise refused(path, f"cannot be read: {error.strerror}") from error
+        raise input_error(path, f"cannot be read: {error.strerror}") from error
     try:
         return tomllib.loads(contents.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         actual = f"byte {error.object[error.start]:#04x} at offset {error.start}"
-        raise refused(path, f"expected UTF-8 text, found {actual}") from error
+        raise input_error(path, f"expected UTF-8 text, found {actual}") from error
     except (
         ValueError,
         RecursionError,
     ) as error:  # TOML's own errors, integers of 5000 digits, brackets without end
-        raise refused(path, f"not TOML: {error}") from error
+        raise input_error(path, f"not TOML: {error}") from error
 
 
 def with_files(
@@ -114,5 +114,5 @@ def _read(
         try:
             contents[name] = read(folder / name)
         except ValueError as error:
-            raise unusable(key, str(error), name) from error
+            raise key_error(key, str(error), name) from error
     return contents

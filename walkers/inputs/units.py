@@ -63,7 +63,7 @@ _ZEROS: Mapping[str, float] = {"K": 0.0, "degC": 273.15, "°C": 273.15}
 
 
 @dataclass(frozen=True)
-class Kind:
+class QuantityKind:
     """Kind of a quantity: name, SI unit, example for messages, and wide physical bounds of its magnitude.
 
     ``sign`` is the accepted one in files: ``more than zero``, ``zero or more``, or anything. As an annotation of a
@@ -110,7 +110,7 @@ class Kind:
         return number
 
 
-def parse_quantity(text: str, kind: Kind) -> float:
+def parse_quantity(text: str, kind: QuantityKind) -> float:
     """Read a quantity of a kind, such as ``"0.3 mm"``, in SI units; raises `ValueError` if it is something else."""
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:
@@ -146,7 +146,7 @@ def _registry() -> UnitRegistry[float]:
 
 
 @lru_cache(maxsize=1024)  # a sweep reads thousands of quantities in the same few units
-def _by_pint(symbol: str, kind: Kind) -> float:
+def _by_pint(symbol: str, kind: QuantityKind) -> float:
     """Conversion factor of an unusual unit to the SI unit of the kind."""
     if kind.unit == TEMPERATURE.unit:
         raise ValueError(kind.expectation)
@@ -182,17 +182,19 @@ def as_quantity(value: Any) -> tuple[float, str | None] | None:
     return None
 
 
-def quantity_text(value: float, kind: Kind) -> str:
+def quantity_text(value: float, kind: QuantityKind) -> str:
     """A number in SI units as text in the unit of the kind's example."""
     unit = _NUMBER_AND_UNIT.fullmatch(kind.example)["unit"]  # type: ignore[index]
     return f"{(value - _ZEROS.get(unit, 0.0)) / _USUAL.get(unit, ('', 1.0))[1]:.6g} {unit}"
 
 
-def kind_in(annotations: Iterable[Any]) -> Kind | None:
+def kind_in(annotations: Iterable[Any]) -> QuantityKind | None:
     """The kind of quantity that a field of a table holds, by its metadata and annotation; or None."""
     for annotation in annotations:
         if (
-            kind := annotation if isinstance(annotation, Kind) else kind_in(get_args(annotation))
+            kind := annotation
+            if isinstance(annotation, QuantityKind)
+            else kind_in(get_args(annotation))
         ) is not None:
             return kind
     return None
@@ -202,19 +204,21 @@ POSITIVE, NOT_NEGATIVE = "more than zero", "zero or more"
 WRITTEN = "written"
 """Context for the validation of user input, which refuses quantities without units."""
 
-LENGTH = Kind("length", "m", "0.3 mm", 1.0, 1e-9, POSITIVE)
-FREQUENCY = Kind("frequency", "Hz", "80 Hz", 1e6, 1e-2, POSITIVE)
-ACCELERATION = Kind("acceleration", "m/s^2", "4 g", 1e4, 1e-9, NOT_NEGATIVE)
-SPEED = Kind("speed", "m/s", "0.02 mm/s", 1e4, 1e-12, POSITIVE)
-TIME = Kind("time", "s", "2 us", 1.0, 1e-12, POSITIVE)
-DURATION = Kind("duration", "s", "4 s", 1e4, 1e-6, POSITIVE)
-ANGLE = Kind("angle", "rad", "10 deg", 1e3)
-DENSITY = Kind("density", "kg/m^3", "4.0 g/cm^3", 1e5, 1.0, POSITIVE)
-SURFACE_TENSION = Kind("surface tension", "N/m", "19.2 mN/m", 10.0, 1e-9, POSITIVE)
-KINEMATIC_VISCOSITY = Kind("kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0, sign=NOT_NEGATIVE)
-DYNAMIC_VISCOSITY = Kind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4, sign=NOT_NEGATIVE)
-MODULUS = Kind("modulus", "Pa", "50 MPa", 1e13, 1e3, POSITIVE)
-TEMPERATURE = Kind("temperature", "K", "20 degC", 373.15, 273.15)
+LENGTH = QuantityKind("length", "m", "0.3 mm", 1.0, 1e-9, POSITIVE)
+FREQUENCY = QuantityKind("frequency", "Hz", "80 Hz", 1e6, 1e-2, POSITIVE)
+ACCELERATION = QuantityKind("acceleration", "m/s^2", "4 g", 1e4, 1e-9, NOT_NEGATIVE)
+SPEED = QuantityKind("speed", "m/s", "0.02 mm/s", 1e4, 1e-12, POSITIVE)
+TIME = QuantityKind("time", "s", "2 us", 1.0, 1e-12, POSITIVE)
+DURATION = QuantityKind("duration", "s", "4 s", 1e4, 1e-6, POSITIVE)
+ANGLE = QuantityKind("angle", "rad", "10 deg", 1e3)
+DENSITY = QuantityKind("density", "kg/m^3", "4.0 g/cm^3", 1e5, 1.0, POSITIVE)
+SURFACE_TENSION = QuantityKind("surface tension", "N/m", "19.2 mN/m", 10.0, 1e-9, POSITIVE)
+KINEMATIC_VISCOSITY = QuantityKind(
+    "kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0, sign=NOT_NEGATIVE
+)
+DYNAMIC_VISCOSITY = QuantityKind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4, sign=NOT_NEGATIVE)
+MODULUS = QuantityKind("modulus", "Pa", "50 MPa", 1e13, 1e3, POSITIVE)
+TEMPERATURE = QuantityKind("temperature", "K", "20 degC", 373.15, 273.15)
 
 Length = Annotated[float, LENGTH]
 Radius = Annotated[float, replace(LENGTH, largest=0.02, smallest=1e-6)]

@@ -15,7 +15,7 @@ from math import isclose, pi
 from pathlib import Path
 from typing import Any
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.files import checksum, read_json, write_json
 from walkers.inputs.bridge_laws import source_of
 from walkers.inputs.case_building import build_case, stored_case
@@ -25,13 +25,13 @@ from walkers.inputs.tables.run import CONSTANT, settling_of
 from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.results import measure
 from walkers.rounding import percent
-from walkers.runner import directory as on_disk
+from walkers.runner import run_directory
 from walkers.runner.binary import find_engine
 from walkers.runner.compiled_model import plugin_of, write_run_script
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.launch import judge
 from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest, write_manifest
-from walkers.runs.case_text import kind_of
+from walkers.runs.case_text import quantity_kind
 from walkers.templates import deck as decks
 from walkers.templates.deck import PRINTED, Segment, suffixes
 
@@ -69,21 +69,21 @@ def write_folder(case: Case, folder: Path) -> Path:
     try:
         folder.mkdir(parents=True)
     except OSError as error:
-        raise refused(
+        raise input_error(
             folder, f"cannot make the folder ({error.strerror}): expected the name of a new one"
         ) from error
     try:
-        on_disk.write_deck(deck, folder)
+        run_directory.write_deck(deck, folder)
         (folder / decks.SCALE_NAME).write_text(_SCALE, encoding="utf-8")
         write_run_script(folder, engine, plugin, deck.layout.ranks)
         if law := source_of(case.liquid.law):
-            shutil.copyfile(law, folder / on_disk.LAW_NAME)
+            shutil.copyfile(law, folder / run_directory.LAW_NAME)
         record = {
             "case": case.as_dict(),
             "deck": deck.text,
             "sha256": checksums(folder, deck.files),
         }
-        write_json(folder / on_disk.DECK_RECORD_NAME, record)
+        write_json(folder / run_directory.DECK_RECORD_NAME, record)
     except OSError as error:  # a disk that is full names no file
         error.filename = str(folder)
         shutil.rmtree(folder, ignore_errors=True)
@@ -100,7 +100,9 @@ def as_run(case: Case, directory: Path | None) -> Case:
     except FileNotFoundError:
         return case
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise refused(directory, f"the run's {MANIFEST_NAME} cannot be read ({error})") from error
+        raise input_error(
+            directory, f"the run's {MANIFEST_NAME} cannot be read ({error})"
+        ) from error
 
 
 def take_in(folder: Path) -> None:
@@ -114,7 +116,7 @@ def take_in(folder: Path) -> None:
     )
     if not logs:
         expected = f"expected a log of the engine, {' or '.join(_LOGS)}"
-        raise refused(
+        raise input_error(
             folder, f"the deck was not run ({expected}); do: cd {folder} && sh {decks.RUN_NAME}"
         )
     log, manifest = max(logs, key=_age), folder / MANIFEST_NAME
@@ -124,11 +126,13 @@ def take_in(folder: Path) -> None:
         _measure(folder, deck, log)
     except MissingFrames as failure:
         why = "the engine that was started by hand still runs or was stopped, or its dump was cut later"
-        raise refused(folder, f"{why}: {failure}") from failure
+        raise input_error(folder, f"{why}: {failure}") from failure
     except EngineFailure as failure:
-        raise refused(folder, f"the deck that was run by hand failed: {failure}") from failure
+        raise input_error(folder, f"the deck that was run by hand failed: {failure}") from failure
     except (OSError, ValueError, KeyError, TypeError, DumpError) as error:
-        raise refused(folder, f"the deck that was run by hand cannot be read ({error})") from error
+        raise input_error(
+            folder, f"the deck that was run by hand cannot be read ({error})"
+        ) from error
 
 
 def _age(path: Path) -> int:
@@ -139,8 +143,8 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
     """Write the files of a run directory: case, layout, segment, tables, result, last the manifest."""
     from walkers.postprocess.measure.gait import are_constant
 
-    record = read_json(folder / on_disk.DECK_RECORD_NAME)
-    before = on_disk.with_recorded_law(stored_case(record["case"]), folder)
+    record = read_json(folder / run_directory.DECK_RECORD_NAME)
+    before = run_directory.with_recorded_law(stored_case(record["case"]), folder)
     words = (_PRINTED.findall(log.read_text(encoding="utf-8", errors="replace")) or [""])[
         -1
     ].split()
@@ -168,9 +172,11 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
     if _age(deck) > _age(log):
         notes.append(f"{deck.name} is newer than {log.name}: if it was edited since, run it again")
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
-    write_json(folder / on_disk.CASE_NAME, case.as_dict(), at_once=False)
+    write_json(folder / run_directory.CASE_NAME, case.as_dict(), at_once=False)
     write_json(folder / decks.LAYOUT_NAME, rendered.layout.as_dict(), at_once=False)
-    on_disk.write_segment_record(folder, segment, report, by_hand=notes, deck_edited=bool(edits))
+    run_directory.write_segment_record(
+        folder, segment, report, by_hand=notes, deck_edited=bool(edits)
+    )
     # Cycles that were enough for the finished run of a case may be too few for an edited deck.
     planned = before.run
     doubtful = (
@@ -180,7 +186,7 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
         reached = f"the velocities are not constant within {percent(CONSTANT)} after {case.run.cycles} cycles"
         more = f"{planned.cycles}, as walkers run does," if planned.until_steady else "more"
         notes.append(f"{reached}; set cycles to {more} and run again")
-        on_disk.write_segment_record(
+        run_directory.write_segment_record(
             folder, segment, report, by_hand=notes, deck_edited=bool(edits)
         )
     measure(folder)
@@ -226,7 +232,7 @@ def _edited(
             implied = values[f"amplitude{end}"] * (2.0 * pi * values[f"frequency{end}"]) ** 2
             numbers[key] = implied if f"amplitude{end}" in edited else values[name]
     changes: dict[str, Any] = {
-        key: f"{number!r} {kind.unit}" if (kind := kind_of(key)) else number
+        key: f"{number!r} {kind.unit}" if (kind := quantity_kind(key)) else number
         for key, number in numbers.items()
     }
     step, steps, cycles = values["time_step"], int(values["steps_per_cycle"]), int(values["cycles"])
@@ -248,10 +254,12 @@ def _edited(
             f"edit steps_per_cycle (a multiple of {parts}); time_step follows from it and the frequency"
         )
     for key, walkers in case.walkers_by_key.items():
-        ran = ran.put(f"{key}.spacing", walkers.spacing)
+        ran = ran.with_value_at(f"{key}.spacing", walkers.spacing)
     lasts = {"time_step": step, "steps_per_cycle": steps, "cycles": cycles}
     kept = ("samples_per_cycle", "cycles_per_sample", "samples_per_bridge_sample")
-    return ran.but(run=ran.run.but(**lasts, **{name: getattr(case.run, name) for name in kept}))
+    return ran.with_values(
+        run=ran.run.with_values(**lasts, **{name: getattr(case.run, name) for name in kept})
+    )
 
 
 def _edited_files(written: Mapping[str, str], folder: Path) -> list[str]:

@@ -9,12 +9,12 @@ from typing import Any
 
 from pydantic_core import to_jsonable_python
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.inputs import units
 from walkers.inputs.config_table import keys_of
 from walkers.inputs.origins import text_of
 from walkers.inputs.tables.case import Case, CaseFile
-from walkers.inputs.units import Kind
+from walkers.inputs.units import QuantityKind
 
 
 class FlatCase(dict[str, Any]):
@@ -46,9 +46,9 @@ def readable(key: str, value: Any) -> str:
         return f"{value * 1e9:.6g} nm"
     if key == "drive.ramp":  # pairs of a time and a pure number
         return ", ".join(
-            f"({text_of(time, kind_of(key))}, {text_of(factor)})" for time, factor in value
+            f"({text_of(time, quantity_kind(key))}, {text_of(factor)})" for time, factor in value
         )
-    return text_of(value, kind_of(key))
+    return text_of(value, quantity_kind(key))
 
 
 def has_value(case: Mapping[str, Any], condition: str) -> bool | None:
@@ -58,7 +58,7 @@ def has_value(case: Mapping[str, Any], condition: str) -> bool | None:
     """
     key, _, text = (part.strip() for part in condition.partition("="))
     if not (key and text):
-        raise refused(
+        raise input_error(
             "where", f'"{condition}": expected KEY=VALUE, such as "drive.frequency=80 Hz"'
         )
     values = {name: value for name, value in case.items() if f".{name}".endswith(f".{key}")}
@@ -72,19 +72,19 @@ def _is(key: str, value: Any, text: str) -> bool:
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not number or text == str(value):
         return text.lower() in (readable(key, value).lower(), str(value).lower())
-    kind = kind_of(key)
+    kind = quantity_kind(key)
     try:
         return isclose(
             units.parse_quantity(text, kind) if kind else float(text), value, rel_tol=1e-6
         )
     except ValueError as error:
-        raise refused(
+        raise input_error(
             "where", f'"{key}={text}": {error if kind else "expected a number without a unit"}'
         ) from error
 
 
 @cache
-def kind_of(key: str) -> Kind | None:
+def quantity_kind(key: str) -> QuantityKind | None:
     """Kind of quantity of a key of a case, such as ``dimers.radii[0]``; None for pure numbers."""
     fields = (field for name, field in keys_of(CaseFile).items() if _ending(name) == _ending(key))
     return next(

@@ -25,7 +25,7 @@ from walkers.postprocess.measure.quantities import (
     scatter_of,
     unit_shown,
 )
-from walkers.postprocess.measure.results import Results, not_computed, plain, read
+from walkers.postprocess.measure.results import Results, json_numbers, not_computed, read_results
 from walkers.rounding import counted, rounded
 from walkers.runner.manifest import read_manifest
 from walkers.runs.case_text import differing, flattened, readable
@@ -75,7 +75,7 @@ def compare_runs(first: Side, second: Side) -> Comparison:
     ]
     not_run, rows = [side.name for side in (first, second) if side.directory is None], []
     if first.directory and second.directory:
-        results = [read(first.directory), read(second.directory)]
+        results = [read_results(first.directory), read_results(second.directory)]
         rows = _rows(*results)
         apart = {row["quantity"]: row for row in rows if row["first"] != row["second"]}
         if "cycles" in apart and not changed:
@@ -203,7 +203,7 @@ def _rows(first: Results, second: Results) -> list[dict[str, Any]]:
         }
         error = hypot(*(result.get(f"{name}_error", nan) for result in results.values()))
         changes = {"difference": numbers["second"] - numbers["first"], "numerical_error": error}
-        row = plain({"quantity": name, "unit": unit, **numbers, **scatters, **changes})
+        row = json_numbers({"quantity": name, "unit": unit, **numbers, **scatters, **changes})
         if row["first"] is not None or row["second"] is not None:
             rows.append(row)
     return rows

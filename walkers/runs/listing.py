@@ -14,14 +14,14 @@ from pathlib import Path
 from stat import S_ISDIR
 from typing import Any
 
-from walkers.errors import InputError, refused, suggestion
+from walkers.errors import InputError, input_error, suggestion
 from walkers.files import read_json
 from walkers.inputs.case_building import stored_case
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.numbers import headline, in_short
-from walkers.postprocess.measure.results import Results, plain, read
+from walkers.postprocess.measure.results import Results, json_numbers, read_results
 from walkers.rounding import duration_text
-from walkers.runner import directory as on_disk
+from walkers.runner import run_directory
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runs.case_text import (
     FlatCase,
@@ -39,7 +39,7 @@ _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Entry:
+class ListEntry:
     """A run or a sweep in a folder of runs.
 
     Attributes
@@ -96,7 +96,7 @@ class Entry:
         return [duration_text(self.age), bytes_text(self.size)]
 
 
-def runs_in(out: Path) -> list[Entry]:
+def runs_in(out: Path) -> list[ListEntry]:
     """The runs in a folder, finished or not, sorted by name.
 
     Raises
@@ -118,39 +118,41 @@ def folders_in(out: Path) -> list[Path]:
     if not out.exists():
         return []
     if not out.is_dir():
-        raise refused(out, "expected a folder of runs, this is a file")
+        raise input_error(out, "expected a folder of runs, this is a file")
     return sorted(path for path in out.iterdir() if path.is_dir())
 
 
 def place_of(directory: Path) -> Path:
     """The final directory of a run, beside which its lock is."""
-    name = directory.name.removesuffix(on_disk.UNFINISHED).removesuffix(on_disk.REPLACED)
+    name = directory.name.removesuffix(run_directory.UNFINISHED).removesuffix(
+        run_directory.REPLACED
+    )
     return directory.with_name(name)
 
 
-def _without_directory(out: Path, listed: set[Path]) -> list[Entry]:
+def _without_directory(out: Path, listed: set[Path]) -> list[ListEntry]:
     """Runs in progress that have a lock alone: in a shared deck, or just before their directory is made."""
     runs = []
     for lock in out.glob("*.lock"):
         place = lock.with_suffix("")
-        if place not in listed and on_disk.is_locked(place):
+        if place not in listed and run_directory.is_locked(place):
             case = place.name.rpartition("-")[0]
             runs.append(
-                Entry(kind="run", name=place.name, case=case, status="running", directory=place)
+                ListEntry(kind="run", name=place.name, case=case, status="running", directory=place)
             )
     return runs
 
 
-def entry_of(path: Path) -> Entry | None:
+def entry_of(path: Path) -> ListEntry | None:
     """The run in a directory; None if the directory is a user's own."""
     place = place_of(path)
-    finished = place == path and on_disk.is_finished(path)
-    is_run_name = on_disk.is_run_name(place.name)
+    finished = place == path and run_directory.is_finished(path)
+    is_run_name = run_directory.is_run_name(place.name)
     if not finished and not is_run_name:
         return None
     case = _case_in(path)
     if case is None:
-        holds_run = finished or (place != path and on_disk.holds_unfinished(path))
+        holds_run = finished or (place != path and run_directory.holds_unfinished(path))
         if not is_run_name or not holds_run:
             return None
     case_name = case.name if case else place.name.rpartition("-")[0]
@@ -162,26 +164,26 @@ def entry_of(path: Path) -> Entry | None:
 
 def _case_in(path: Path) -> Case | None:
     try:
-        return stored_case(read_json(path / on_disk.CASE_NAME))
+        return stored_case(read_json(path / run_directory.CASE_NAME))
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
-def _finished(path: Path, case: str, parameters: FlatCase) -> Entry:
+def _finished(path: Path, case: str, parameters: FlatCase) -> ListEntry:
     size, _ = weigh(path)
     numbers, velocity, text, reason = None, None, "-", None
     try:
-        results = read(path)
+        results = read_results(path)
     except InputError as error:
         reason = error.problems[0].expected
     else:
-        numbers = plain(results)
+        numbers = json_numbers(results)
         text = in_short(results)
         main = headline(results)
         if main != "climbs":
             velocity = numbers.get(main)
         reason = _remark(results)
-    return Entry(
+    return ListEntry(
         kind="run",
         name=path.name,
         case=case,
@@ -204,7 +206,7 @@ def _remark(results: Results) -> str | None:
     return next(iter(results.about["by_hand"]), None)
 
 
-def _unfinished(path: Path, case: str, parameters: FlatCase) -> Entry:
+def _unfinished(path: Path, case: str, parameters: FlatCase) -> ListEntry:
     place = place_of(path)
     size, changed = weigh(path)
     state = state_at(place, path)
@@ -216,7 +218,7 @@ def _unfinished(path: Path, case: str, parameters: FlatCase) -> Entry:
         progress = progress_at(place)
         if progress:
             reason = progress.stage
-    return Entry(
+    return ListEntry(
         kind="run",
         name=place.name,
         case=case,
@@ -269,7 +271,7 @@ def bytes_text(size: int) -> str:
     return f"{size} B"
 
 
-def select(runs: Sequence[Entry], where: Iterable[str]) -> list[Entry]:
+def select(runs: Sequence[ListEntry], where: Iterable[str]) -> list[ListEntry]:
     """The runs that have all values (`has_value`).
 
     Raises
@@ -284,7 +286,7 @@ def select(runs: Sequence[Entry], where: Iterable[str]) -> list[Entry]:
             keys = short_keys(sorted({key for run in selected for key in run.parameters}))
             near = suggestion(condition.partition("=")[0].strip(), keys)
             text = f'"{condition}": no run has such a key{near}; runs have {", ".join(keys)}'
-            raise refused("where", text)
+            raise input_error("where", text)
         selected = [run for run, answer in zip(selected, answers, strict=True) if answer]
     return selected
 
@@ -294,7 +296,7 @@ class RunsOfCase:
     """The runs of a case, and the keys by which they differ, without those that follow from given ones."""
 
     case: str
-    runs: Sequence[Entry]
+    runs: Sequence[ListEntry]
     keys: Sequence[str]
 
     def as_text(self) -> str:
@@ -310,9 +312,9 @@ class RunsOfCase:
         return aligned(lines)
 
 
-def by_case(runs: Sequence[Entry]) -> list[RunsOfCase]:
+def by_case(runs: Sequence[ListEntry]) -> list[RunsOfCase]:
     """The runs of each case together."""
-    runs_of: dict[str, list[Entry]] = {}
+    runs_of: dict[str, list[ListEntry]] = {}
     for run in runs:
         runs_of.setdefault(run.case, []).append(run)
     groups = []

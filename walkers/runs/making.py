@@ -23,11 +23,11 @@ from typing import Any
 from walkers.errors import Stopped, WalkersError
 from walkers.files import fsync_path, link_or_copy, make_folder, read_json, write_json
 from walkers.inputs.tables.case import Case
-from walkers.inputs.tables.run import Run
+from walkers.inputs.tables.run import RunSettings
 from walkers.postprocess.measure.results import measure
 from walkers.progress import Progress, Tell
 from walkers.rounding import duration_text
-from walkers.runner import directory as on_disk
+from walkers.runner import run_directory
 from walkers.runner.binary import Engine
 from walkers.runner.failures import BeadsOverTheTop
 from walkers.runner.launch import EngineReport, check_room, last_step, launch
@@ -70,12 +70,14 @@ def make_runs(
     those that another process makes.
     """
     make_folder(out)
-    places = {on_disk.run_place(case, engine, out): case for case in cases}
-    with on_disk.locked(places) as ours:
+    places = {run_directory.run_place(case, engine, out): case for case in cases}
+    with run_directory.locked(places) as ours:
         for place in ours:
-            on_disk.recover(place)
+            run_directory.recover(place)
         runs = (
-            {} if force else {place.name: False for place in places if on_disk.is_finished(place)}
+            {}
+            if force
+            else {place.name: False for place in places if run_directory.is_finished(place)}
         )
         missing = {
             place: case
@@ -101,7 +103,7 @@ def make_runs(
                 left = {name: case for name, case in left.items() if name not in runs}
         for place in missing if not dumps else ():
             if place.name in runs:
-                on_disk.leave_out_dumps(place)
+                run_directory.leave_out_dumps(place)
     return runs
 
 
@@ -110,24 +112,24 @@ def progress_at(place: Path, case: Case | None = None) -> Progress | None:
 
     The case is read as well, unless it is given.
     """
-    directory = on_disk.unfinished(place)
+    directory = run_directory.unfinished(place)
     shared = directory / DECK_FOLDER
     try:
         if shared.is_dir():
-            share = last_step(shared / decks.OUTPUT_NAME) / on_disk.layout_of(shared).steps
+            share = last_step(shared / decks.OUTPUT_NAME) / run_directory.read_layout(shared).steps
             percent = f"{100 * share:.0f} %"
             return Progress(share, percent, percent)
-        case = case or on_disk.case_of(directory)
-        done = [_read_segment(path) for path in on_disk.segment_directories(directory)]
-        (folder,) = (directory / on_disk.SEGMENTS).glob("*.new")
+        case = case or run_directory.case_of(directory)
+        done = [_read_segment(path) for path in run_directory.segment_directories(directory)]
+        (folder,) = (directory / run_directory.SEGMENTS).glob("*.new")
         run = case.run
         cycles = (
-            on_disk.layout_of(folder).steps // run.steps_per_cycle
+            run_directory.read_layout(folder).steps // run.steps_per_cycle
             if run.until_steady
             else run.cycles
         )
         begin = int(done[-1]["end"]) if done else 0
-        start = on_disk.drive_from(case, done)
+        start = run_directory.drive_from(case, done)
         step = max(begin, last_step(folder / decks.OUTPUT_NAME))
         seconds = time.time() - (folder / decks.DECK_NAME).stat().st_mtime
     except (OSError, ValueError, KeyError, TypeError, WalkersError):
@@ -148,24 +150,26 @@ def share_kept(place: Path) -> float | None:
     float or None
         From 0 to 1; None if there is no unfinished run, or its files cannot be read.
     """
-    directory = on_disk.unfinished(place)
+    directory = run_directory.unfinished(place)
     try:
-        case = on_disk.case_of(directory)
-        segments = on_disk.segment_directories(directory)
+        case = run_directory.case_of(directory)
+        segments = run_directory.segment_directories(directory)
         if not segments:
             return 0.0
         done = [_read_segment(path) for path in segments]
         cycles = case.run.cycles
         if case.run.until_steady:
-            cycles = on_disk.layout_of(segments[-1]).steps // case.run.steps_per_cycle
+            cycles = run_directory.read_layout(segments[-1]).steps // case.run.steps_per_cycle
     except (OSError, ValueError, KeyError, TypeError, WalkersError):
         return None
     end = int(done[-1]["end"])
-    segment = Segment(end, end, on_disk.drive_from(case, done))
+    segment = Segment(end, end, run_directory.drive_from(case, done))
     return progress_in(case.run, cycles, segment, end, 0.0).share
 
 
-def progress_in(run: Run, cycles: int, segment: Segment, step: int, seconds: float) -> Progress:
+def progress_in(
+    run: RunSettings, cycles: int, segment: Segment, step: int, seconds: float
+) -> Progress:
     """Progress at a step of a segment, ``seconds`` after its begin, in the attempt with a number of cycles."""
     before, steps, start = (
         run.steps_until(cycles - 1),
@@ -226,7 +230,7 @@ class OpenRun:
         for cycles in self.case.run.attempts:
             case = self.case.for_cycles(cycles)
             if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
-                for directory in on_disk.segment_directories(
+                for directory in run_directory.segment_directories(
                     self.directory
                 ):  # of an attempt with fewer cycles
                     shutil.rmtree(directory)
@@ -239,11 +243,13 @@ class OpenRun:
                         self.ended = "a cluster has climbed (run.until)"
                         return
                 except BeadsOverTheTop as over:
-                    begun_at = on_disk.drive_from(self.case, self.done)
+                    begun_at = run_directory.drive_from(self.case, self.done)
                     if not case.boundary.closed or begun_at is None or segment.begin <= begun_at:
                         raise
                     # A climber left the container: this ends the experiment; the segments before are valid.
-                    shutil.rmtree(self.directory / on_disk.SEGMENTS / f"{len(self.done):04d}.new")
+                    shutil.rmtree(
+                        self.directory / run_directory.SEGMENTS / f"{len(self.done):04d}.new"
+                    )
                     self.ended = (
                         f"{over.lost} bead(s) left the container over its walls in the next segment"
                     )
@@ -259,7 +265,7 @@ class OpenRun:
         from walkers.postprocess.measure.piles import has_climbed
 
         if (
-            on_disk.drive_from(self.case, self.done[:-1]) is None
+            run_directory.drive_from(self.case, self.done[:-1]) is None
         ):  # the beads came to rest in this segment
             return False
         return has_climbed(read_motion(self.directory))
@@ -268,7 +274,7 @@ class OpenRun:
         return decks.next_segment(
             case,
             int(self.done[-1]["end"]) if self.done else 0,
-            on_disk.drive_from(self.case, self.done),
+            run_directory.drive_from(self.case, self.done),
         )
 
     def _make(
@@ -278,18 +284,18 @@ class OpenRun:
         tell: Callable[[int], None] | None,
         time_limit: float | None,
     ) -> None:
-        folder, number = self.directory / on_disk.SEGMENTS, len(self.done)
+        folder, number = self.directory / run_directory.SEGMENTS, len(self.done)
         new, before = folder / f"{number:04d}.new", folder / f"{number - 1:04d}"
         shutil.rmtree(new, ignore_errors=True)
-        if number and not on_disk.has_tables_of(before, deck):
+        if number and not run_directory.has_tables_of(before, deck):
             raise BridgeTablesDiffer(
                 f"{before / decks.BRIDGES_NAME} has other forces than this program computes: the run was begun "
                 "by another version, or on another kind of machine; "
                 f"delete {self.directory} and repeat the run, or continue it there"
             )
-        with on_disk.room_on_disk(new, deck.layout.bead_dump_bytes):
+        with run_directory.room_on_disk(new, deck.layout.bead_dump_bytes):
             new.mkdir()
-            on_disk.write_deck(deck, new, before if number else None)
+            run_directory.write_deck(deck, new, before if number else None)
             if segment.begin:
                 shutil.copyfile(before / decks.RESTART_NAME, new / decks.PREVIOUS_RESTART_NAME)
             report = launch(
@@ -303,7 +309,7 @@ class OpenRun:
             ):  # the engine does not check this
                 raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
             velocities = _RMS_VELOCITY.findall((new / decks.OUTPUT_NAME).read_bytes())
-            record = on_disk.write_segment_record(
+            record = run_directory.write_segment_record(
                 new, segment, report, float(velocities[-1]) if velocities else None
             )
             os.sync()  # so that the new name survives a loss of power; faster than file by file
@@ -322,7 +328,7 @@ class OpenRun:
         report = EngineReport(
             self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"])
         )
-        start = on_disk.drive_from(self.case, self.done) or 0
+        start = run_directory.drive_from(self.case, self.done) or 0
         rest = [
             segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start
         ]
@@ -335,11 +341,11 @@ class OpenRun:
         about |= {"ended": self.ended} if self.ended else {}
         write_manifest(self.case, self.place.name, self.engine, report, **about)
         os.sync()
-        on_disk.move_into_place(self.directory, self.place)
+        run_directory.move_into_place(self.directory, self.place)
 
 
 def _teller(
-    run: Run, cycles: int, segment: Segment, tell: Tell | None
+    run: RunSettings, cycles: int, segment: Segment, tell: Tell | None
 ) -> Callable[[int], None] | None:
     """A function that reports the progress of the run at a step of a segment."""
     begin = time.perf_counter()
@@ -356,21 +362,21 @@ def open_locked(
 
     Without `OpenRun.finish` the directory remains ``….incomplete``; after a failure it contains ``failure.json``.
     """
-    directory = on_disk.unfinished(place)
-    on_disk.recover(place)
+    directory = run_directory.unfinished(place)
+    run_directory.recover(place)
     if anew:
         shutil.rmtree(directory, ignore_errors=True)
     try:
-        with on_disk.room_on_disk(directory):
-            (directory / on_disk.SEGMENTS).mkdir(parents=True, exist_ok=True)
+        with run_directory.room_on_disk(directory):
+            (directory / run_directory.SEGMENTS).mkdir(parents=True, exist_ok=True)
             # Left by an earlier call, besides complete segments: tables, incomplete files and segments.
-            for path in (*directory.iterdir(), *(directory / on_disk.SEGMENTS).glob("*.new")):
+            for path in (*directory.iterdir(), *(directory / run_directory.SEGMENTS).glob("*.new")):
                 if path.is_file():
                     path.unlink()
-                elif path.name != on_disk.SEGMENTS:
+                elif path.name != run_directory.SEGMENTS:
                     shutil.rmtree(path)
-            on_disk.write_case(directory, case)
-            done = [_read_segment(path) for path in on_disk.segment_directories(directory)]
+            run_directory.write_case(directory, case)
+            done = [_read_segment(path) for path in run_directory.segment_directories(directory)]
             yield OpenRun(case, engine, directory, place, locks, done)
     except Stopped:
         raise
@@ -381,13 +387,13 @@ def open_locked(
             "lost": getattr(failure, "lost", 0),
         }
         with suppress(OSError):  # the disk may be full; the message reaches the user anyway
-            write_json(directory / on_disk.FAILURE_NAME, contents)
+            write_json(directory / run_directory.FAILURE_NAME, contents)
         raise
 
 
 def _read_segment(directory: Path) -> dict[str, Any]:
     try:
-        record = read_json(directory / on_disk.SEGMENT_NAME)
+        record = read_json(directory / run_directory.SEGMENT_NAME)
         if record["end"] > record["begin"] and "drive_from" in record:
             return record
         raise ValueError("begin, end or drive_from is missing or wrong")
@@ -414,19 +420,19 @@ def _make_together(
     tried = {name: case.for_cycles(cycles) for name, case in cases.items()}
     deck, started = decks.compose(decks.plan_of(*tried.values())), time.time()
     first = next(iter(cases))
-    incomplete = on_disk.unfinished(out / first)
+    incomplete = run_directory.unfinished(out / first)
     shutil.rmtree(incomplete, ignore_errors=True)
     try:
-        with on_disk.room_on_disk(incomplete, deck.layout.bead_dump_bytes):
+        with run_directory.room_on_disk(incomplete, deck.layout.bead_dump_bytes):
             check_room(
                 out, 2 * deck.layout.bead_dump_bytes
             )  # the dump and its parts exist at the same time
             (incomplete / DECK_FOLDER).mkdir(parents=True)
-            on_disk.write_deck(deck, incomplete / DECK_FOLDER)
+            run_directory.write_deck(deck, incomplete / DECK_FOLDER)
             # For other processes the directory is the unfinished first run.
             for name, case in [(".", cases[first]), *cases.items()]:
                 (incomplete / name).mkdir(exist_ok=True)
-                on_disk.write_case(incomplete / name, case)
+                run_directory.write_case(incomplete / name, case)
             tell = _teller(cases[first].run, cycles, decks.next_segment(tried[first]), on_progress)
             folder = incomplete / DECK_FOLDER
             report = launch(
@@ -452,11 +458,11 @@ def _make_together(
                 )
             os.sync()
             for name in done:
-                on_disk.move_into_place(incomplete / name, out / name)
+                run_directory.move_into_place(incomplete / name, out / name)
     finally:
         shutil.rmtree(incomplete, ignore_errors=True)
     for name in done:  # remains of a run that was made alone and killed
-        shutil.rmtree(on_disk.unfinished(out / name), ignore_errors=True)
+        shutil.rmtree(run_directory.unfinished(out / name), ignore_errors=True)
     return done
 
 
@@ -464,12 +470,12 @@ def _part(incomplete: Path, cases: Mapping[str, Case], deck: Deck, report: Engin
     """Give each run its part of the output, and the deck."""
     from walkers.runs.splitting import split_output
 
-    places = {incomplete / name / on_disk.FIRST_SEGMENT: case for name, case in cases.items()}
+    places = {incomplete / name / run_directory.FIRST_SEGMENT: case for name, case in cases.items()}
     for place in places:
         place.mkdir(parents=True)
     split_output(incomplete / DECK_FOLDER, deck.layout, places)
     for name, (place, case) in zip(cases, places.items(), strict=True):
-        on_disk.write_segment_record(place, decks.next_segment(case), report)
+        run_directory.write_segment_record(place, decks.next_segment(case), report)
         shutil.copytree(
             incomplete / DECK_FOLDER, incomplete / name / DECK_FOLDER, copy_function=link_or_copy
         )

@@ -13,17 +13,17 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from walkers import DEFAULT_OUT, RECORDS
-from walkers.errors import InputError, WalkersError, refused
+from walkers.errors import InputError, WalkersError, input_error
 from walkers.inputs.case_building import changed_case
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
 from walkers.inputs.tables.case import Case
-from walkers.runner import directory as on_disk
+from walkers.runner import run_directory
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import EngineMissing
 from walkers.runner.manifest import read_manifest
 
 NotARun = Literal["sweep", "calibration", "archive", "deck", "folder"]
-Kind = Literal["run", "case"] | NotARun
+NameKind = Literal["run", "case"] | NotARun
 Given: TypeAlias = "Case | str | Path | Mapping[str, Any]"
 """What may stand for a case: a resolved case, its file or name, or its tables."""
 Changes: TypeAlias = "Mapping[str, Any] | None"
@@ -40,7 +40,7 @@ _NOT_A_RUN: Mapping[NotARun, str] = {
 
 def not_a_run(name: object, kind: NotARun) -> InputError:
     """An error that says what a name means, where a run was expected."""
-    return refused(name, _NOT_A_RUN[kind].format(name=name))
+    return input_error(name, _NOT_A_RUN[kind].format(name=name))
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Reference:
     """
 
     given: Given
-    kind: Kind
+    kind: NameKind
     path: Path
     out: Path
     changes: Mapping[str, Any]
@@ -99,7 +99,7 @@ class Reference:
             find_input(str(given) if is_sweep_file(Path(given)) else self.path, "case")
             raise not_a_run(given, self.kind)
         if self.kind == "folder":
-            raise refused(given, "is a folder without a run")
+            raise input_error(given, "is a folder without a run")
         if self.kind in ("deck", "archive"):
             raise not_a_run(given, self.kind)
         return load_case(given, self.changes)
@@ -111,10 +111,10 @@ class Reference:
             place = self.path
         else:
             try:
-                place = on_disk.run_place(self.case, find_engine(), self.folder)
+                place = run_directory.run_place(self.case, find_engine(), self.folder)
             except EngineMissing:
                 return None
-        return place if on_disk.is_finished(place) else None
+        return place if run_directory.is_finished(place) else None
 
 
 def find(
@@ -137,7 +137,7 @@ def find(
     """
     if isinstance(given, Reference):
         return given
-    kind: Kind = "case"
+    kind: NameKind = "case"
     path = Path(out)
     if isinstance(given, (str, Path)):
         path = Path(given)
@@ -146,17 +146,17 @@ def find(
     return Reference(given, kind, path, Path(out), changes or {})
 
 
-def _meanings(path: Path, out: Path, *, is_shipped: bool) -> Iterator[tuple[Kind, Path]]:
+def _meanings(path: Path, out: Path, *, is_shipped: bool) -> Iterator[tuple[NameKind, Path]]:
     """What a path may mean, and where that is, the most likely first; whether it is the name of a shipped case."""
-    kinds: tuple[Kind, ...] = ("run", "sweep", "calibration")
+    kinds: tuple[NameKind, ...] = ("run", "sweep", "calibration")
     for place in (path, out / path):
         for kind in kinds:
             if (place / RECORDS[kind]).is_file():
                 yield kind, place
-        complete = place.parent / place.name.removesuffix(on_disk.UNFINISHED)
-        if on_disk.is_run_name(complete.name) and is_begun(complete):
+        complete = place.parent / place.name.removesuffix(run_directory.UNFINISHED)
+        if run_directory.is_run_name(complete.name) and is_begun(complete):
             yield "run", complete
-        if on_disk.is_deck_folder(place) and not is_shipped:
+        if run_directory.is_deck_folder(place) and not is_shipped:
             yield "deck", place
     if (out / path.stem / RECORDS["sweep"]).is_file() and is_sweep_file(path):
         yield "sweep", out / path.stem
@@ -167,7 +167,9 @@ def _meanings(path: Path, out: Path, *, is_shipped: bool) -> Iterator[tuple[Kind
 
 def is_begun(place: Path) -> bool:
     """Whether a place belongs to a running or interrupted run."""
-    return (on_disk.unfinished(place) / on_disk.CASE_NAME).is_file() or on_disk.is_locked(place)
+    return (
+        run_directory.unfinished(place) / run_directory.CASE_NAME
+    ).is_file() or run_directory.is_locked(place)
 
 
 def readable_case(directory: Path) -> Case:
@@ -183,15 +185,17 @@ def readable_case(directory: Path) -> Case:
     InputError
         If a file that describes the run cannot be read.
     """
-    is_finished = on_disk.is_finished(directory)
+    is_finished = run_directory.is_finished(directory)
     if is_finished:
         with refusing(directory, "the run's manifest.json"):
             read_manifest(directory)
     with refusing(directory, "the run's case.json"):
-        case = on_disk.case_of(directory if is_finished else on_disk.unfinished(directory))
+        case = run_directory.case_of(
+            directory if is_finished else run_directory.unfinished(directory)
+        )
     if is_finished:
         with refusing(directory, "the run's layout.json"):
-            on_disk.layout_of(on_disk.segment_directories(directory)[0])
+            run_directory.read_layout(run_directory.segment_directories(directory)[0])
     return case
 
 
@@ -209,4 +213,4 @@ def refusing(directory: Path, contents: str) -> Iterator[None]:
         IndexError,
         WalkersError,
     ) as error:
-        raise refused(directory, f"{contents} cannot be read ({error})") from error
+        raise input_error(directory, f"{contents} cannot be read ({error})") from error

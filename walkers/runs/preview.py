@@ -209,7 +209,7 @@ def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
     ]
 
 
-def describe(summary: dict[str, Any]) -> str:
+def preview_text(summary: dict[str, Any]) -> str:
     """The summary as text."""
     beads, drive, dimer = summary["beads"], summary["drive"], summary.get("dimer")
     ratio, gravity = beads["stiffness_ratio"], summary["case"]["environment"]["gravity"]

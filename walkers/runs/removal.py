@@ -17,17 +17,17 @@ from pathlib import Path
 
 from walkers.files import VTK_SCRATCH, abandoned
 from walkers.rounding import counted, duration_text
-from walkers.runner import directory as on_disk
-from walkers.runner.directory import CASE_NAME
+from walkers.runner import run_directory
 from walkers.runner.manifest import MANIFEST_NAME
-from walkers.runs.listing import Entry, bytes_text, place_of, runs_in, weigh
+from walkers.runner.run_directory import CASE_NAME
+from walkers.runs.listing import ListEntry, bytes_text, place_of, runs_in, weigh
 from walkers.text import aligned
 
 _MOST_LINES = 40
 _IN_PROGRESS = "kept: a process is computing it"
 
 
-class Kind(Enum):
+class RemovalKind(Enum):
     """What is removed; an unfinished export is a folder that a killed export to VTK left."""
 
     RUN = "run"
@@ -53,7 +53,7 @@ class Removal:
     """
 
     path: Path
-    kind: Kind
+    kind: RemovalKind
     status: str = ""
     remark: str = ""
 
@@ -70,35 +70,35 @@ def unfinished_in(out: Path) -> list[Removal]:
     """
     runs = runs_in(out)
     removals = [removal_of(run) for run in runs if run.status != "finished" and is_removable(run)]
-    removals += [Removal(lock, Kind.LOCK) for lock in _stale_locks(out)]
-    removals += [Removal(folder, Kind.EXPORT) for folder in _abandoned_exports(out, runs)]
+    removals += [Removal(lock, RemovalKind.LOCK) for lock in _stale_locks(out)]
+    removals += [Removal(folder, RemovalKind.EXPORT) for folder in _abandoned_exports(out, runs)]
     return removals
 
 
-def is_removable(run: Entry) -> bool:
+def is_removable(run: ListEntry) -> bool:
     """Whether a run is not in progress, and no run is about to be restored from its directory."""
     if run.status == "running":
         return False
-    is_replaced = run.directory.name.endswith(on_disk.REPLACED)
+    is_replaced = run.directory.name.endswith(run_directory.REPLACED)
     return not is_replaced or place_of(run.directory).exists()
 
 
-def removal_of(run: Entry) -> Removal:
+def removal_of(run: ListEntry) -> Removal:
     """The removal of a run."""
     remark = run.reason or ""
     if run.directory.is_symlink():
         remark = "a symbolic link: its target stays"
     elif run.status == "interrupted":
         remark = f"{run.reason}, can be continued" if run.reason else "can be continued"
-    return Removal(run.directory, Kind.RUN, run.status, remark)
+    return Removal(run.directory, RemovalKind.RUN, run.status, remark)
 
 
 def _stale_locks(out: Path) -> list[Path]:
-    locks = [lock for lock in sorted(out.glob("*.lock")) if on_disk.is_run_name(lock.stem)]
-    return [lock for lock in locks if not on_disk.is_locked(lock.with_suffix(""))]
+    locks = [lock for lock in sorted(out.glob("*.lock")) if run_directory.is_run_name(lock.stem)]
+    return [lock for lock in locks if not run_directory.is_locked(lock.with_suffix(""))]
 
 
-def _abandoned_exports(out: Path, runs: Sequence[Entry]) -> list[Path]:
+def _abandoned_exports(out: Path, runs: Sequence[ListEntry]) -> list[Path]:
     """Folders that killed exports left in the folder of runs and in finished runs."""
     parents = [run.directory for run in runs if run.status == "finished"]
     if out.is_dir():
@@ -109,7 +109,7 @@ def _abandoned_exports(out: Path, runs: Sequence[Entry]) -> list[Path]:
     return exports
 
 
-def describe(removals: Sequence[Removal]) -> str:
+def removal_text(removals: Sequence[Removal]) -> str:
     """What is to be removed, a line each with the time since its last change, and the total size."""
     now = time.time()
     lines = []
@@ -154,10 +154,10 @@ def remove(removals: Sequence[Removal]) -> dict[Path, str]:
 
 def _remove(removal: Removal) -> str:
     """Remove a directory or a file; return why it is left, or an empty text."""
-    if removal.kind is Kind.RUN:
+    if removal.kind is RemovalKind.RUN:
         return _remove_run(removal.path)
-    if removal.kind is Kind.LOCK:
-        with on_disk.locked([removal.path.with_suffix("")]) as ours:
+    if removal.kind is RemovalKind.LOCK:
+        with run_directory.locked([removal.path.with_suffix("")]) as ours:
             return "" if ours else _IN_PROGRESS  # a lock file goes with its lock
     _remove_directory(removal.path)
     return ""
@@ -165,10 +165,10 @@ def _remove(removal: Removal) -> str:
 
 def _remove_run(directory: Path) -> str:
     place = place_of(directory)
-    with on_disk.locked([place]) as ours:
+    with run_directory.locked([place]) as ours:
         if not ours:
             return _IN_PROGRESS
-        on_disk.recover(place)
+        run_directory.recover(place)
         if directory.is_dir() and not directory.is_symlink():  # recovery removes what was replaced
             (directory / MANIFEST_NAME).unlink(missing_ok=True)
             _remove_contents(directory, keep=CASE_NAME)

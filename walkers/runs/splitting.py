@@ -14,10 +14,10 @@ from walkers.postprocess.measure.dump import BinaryDump, local_frames, write_loc
 from walkers.postprocess.measure.motion import NEAR, came_near
 from walkers.runner.failures import WalkersMet
 from walkers.templates.deck import LAYOUT_NAME
-from walkers.templates.layout import Layout
+from walkers.templates.layout import DeckLayout
 
 
-def split_output(directory: Path, layout: Layout, cases: Mapping[Path, Case]) -> None:
+def split_output(directory: Path, layout: DeckLayout, cases: Mapping[Path, Case]) -> None:
     """Write the dumps and the layout of each case into its directory, and remove those of the shared deck.
 
     ``cases`` are in the order of the deck. Beads and walkers are renumbered; their positions are those in the shared

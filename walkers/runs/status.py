@@ -8,7 +8,7 @@ from pathlib import Path
 
 from walkers.files import read_json
 from walkers.postprocess.measure.results import Results
-from walkers.runner.directory import FAILURE_NAME, is_finished, is_locked, unfinished
+from walkers.runner.run_directory import FAILURE_NAME, is_finished, is_locked, unfinished
 from walkers.runs.making import share_kept
 
 _STATUSES = ("finished", "running", "failed", "missing")

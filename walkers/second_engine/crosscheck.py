@@ -20,7 +20,7 @@ from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
-from walkers.postprocess.measure.gait import averages, walk
+from walkers.postprocess.measure.gait import averages, measure_walk
 from walkers.postprocess.measure.motion import Motion
 from walkers.second_engine.engine import SecondEngine
 from walkers.second_engine.lines import Line, Verdict
@@ -73,10 +73,10 @@ def crosscheck(
         for number in range(seeds)
     ]
     motions = [run(start, out, progress=progress, engine=engine).motion for start in cases]
-    return compare(motions, without)
+    return cross_check(motions, without)
 
 
-def compare(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Line]:
+def cross_check(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Line]:
     """Compare finished runs of a case, one per start, with the second engine without some terms."""
     seconds = [simulate(motion, without) for motion in motions]
     pile, names = motions[0].case.mixture is not None, [*measured(motions[0])]
@@ -139,7 +139,7 @@ def measured(motion: Motion) -> dict[tuple[str, str], float]:
             *beads,
             *(f"beads {first + 1}-{second + 1}" for first, second in group.make.pairs),
         ]
-        numbers[f"velocity{label}", "mm/s"] = 1e3 * float(walk(group)["velocity"].mean())
+        numbers[f"velocity{label}", "mm/s"] = 1e3 * float(measure_walk(group)["velocity"].mean())
         gait, kinds = (
             averages(group),
             (("rotation", beads), ("sliding", contacts), ("open", contacts)),
@@ -157,7 +157,7 @@ def measured(motion: Motion) -> dict[tuple[str, str], float]:
     return numbers
 
 
-def shortened(case: Case, cycles: int) -> Case:
+def with_cycles(case: Case, cycles: int) -> Case:
     """The case with a number of cycles in one segment, a third of them for settling.
 
     ``ValueError`` if samples are taken more rarely, or there would be too few.
@@ -253,4 +253,4 @@ def full_cases() -> dict[str, Case]:
         "pile-ci": (load_case("pile-ci"), 24),
     }
     whole = {name: load_case(name) for name in ("fig1b", "fig4a", "fig4b")}
-    return whole | {name: shortened(case, cycles) for name, (case, cycles) in shorter.items()}
+    return whole | {name: with_cycles(case, cycles) for name, (case, cycles) in shorter.items()}

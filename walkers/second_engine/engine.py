@@ -10,13 +10,13 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from walkers.arrays import FloatArray
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.inputs.resolving.loads import surfaces_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import KernelRow, Wall
 from walkers.physics.bridge import BridgeLaw, Surfaces
 from walkers.second_engine import kernels
-from walkers.second_engine.kernels import CELLS, Bridges, Constants, State
+from walkers.second_engine.kernels import CELLS, BridgeSplines, Constants, State
 
 TERMS = ("capillary", "lubrication", "damping", "friction", "rolling-friction", "gravity", "drive")
 """Terms that can be left out: pull and resistances of bridges, damping of contacts, the tangential contact force, the
@@ -125,7 +125,7 @@ def _splined(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray
     return np.array([curve.formation, scale, middle, end]), np.stack(splines)
 
 
-def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridges:
+def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> BridgeSplines:
     sizes, kind = np.unique(radius, return_inverse=True)
     between, full = (
         np.empty((len(sizes), len(sizes) + 1), dtype=np.int64),
@@ -146,7 +146,7 @@ def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> Bridge
     spans, splines, volumes = map(np.stack, zip(*tables, strict=True))
     liquid = 4.0 / 3.0 * pi * radius**3 * case.liquid.of_bridges.volume_fraction
     steps = 8 if case.liquid.conserved else 0
-    return Bridges(
+    return BridgeSplines(
         spans, splines * acts, kind.astype(np.int64), between, volumes, steps, full, liquid
     )
 
@@ -156,7 +156,7 @@ def _rows_of(case: Case, walls: Sequence[Wall]) -> list[KernelRow]:
     for wall in walls:
         row = wall.kernel_row()
         if row is None:
-            raise refused(
+            raise input_error(
                 case.name,
                 "boundary.mesh: expected a vessel of planes; the second engine knows no facets",
             )

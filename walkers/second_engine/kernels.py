@@ -2,7 +2,7 @@
 
 Normals point from the second body (or the wall) to the first; h is the gap, δ = -h the overlap. Two surfaces meet by
 `meet`, whose terms are Hertz's repulsion with Tsuji's damping, Mindlin's spring with damping, both together no larger
-than μ times the elastic repulsion, rolling friction, and a bridge, whose pull and resistances are splines (`Bridges`).
+than μ times the elastic repulsion, rolling friction, and a bridge, whose pull and resistances are splines (`BridgeSplines`).
 Forces are those at the new places, of the velocities half a step before (velocity Verlet with the forces evaluated once
 a step: L. Verlet, Phys. Rev. 159 (1967) 98; in granular codes as in Plimpton, J. Comput. Phys. 117 (1995) 1, doi
 10.1006/jcph.1995.1039).
@@ -34,7 +34,7 @@ FORMATION, SCALE, MIDDLE, RUPTURE = range(4)
 NONE: Vector = (0.0, 0.0, 0.0)
 
 
-class Bridges(NamedTuple):
+class BridgeSplines(NamedTuple):
     """T bridges as splines in h up to the scale, in ln h up to the middle, and in √(rupture - h) up to the rupture.
 
     ``spans`` (T, 4): gaps at which a bridge forms, pieces end, and it breaks, m; ``splines`` (T, 3, CELLS, 4, 5):
@@ -83,7 +83,7 @@ class Constants(NamedTuple):
     rolling: float
     reach: FloatArray
     skin: float
-    bridges: Bridges
+    bridges: BridgeSplines
 
 
 class State(NamedTuple):
@@ -154,7 +154,9 @@ def plus(a: Vector, scale: float, b: Vector) -> Vector:
 
 
 @compiled
-def bridge_forces(b: Bridges, bridge: int, gap: float) -> tuple[float, float, float, float, float]:
+def bridge_forces(
+    b: BridgeSplines, bridge: int, gap: float
+) -> tuple[float, float, float, float, float]:
     """Pull (N) and resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s)."""
     scale, middle, rupture = (
         b.spans[bridge, SCALE],
@@ -254,7 +256,7 @@ def separation(c: Constants, state: State, i: int, j: int) -> tuple[Vector, floa
 
 
 @compiled
-def bridge_of(b: Bridges, state: State, i: int, j: int, held: int, gap: float) -> int:
+def bridge_of(b: BridgeSplines, state: State, i: int, j: int, held: int, gap: float) -> int:
     """Index of the bridge of a pair, or -1; a bridge that forms takes its volume from films, and later returns it.
 
     It takes liquid in proportion to the films' offers, and returns it in proportion to the contributions of full films.

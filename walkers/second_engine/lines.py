@@ -9,8 +9,8 @@ from itertools import groupby
 from math import inf, isfinite, nan
 from typing import Any, TypeVar
 
-from walkers.errors import expected_of, refused
-from walkers.postprocess.measure.results import plain
+from walkers.errors import expected_of, input_error
+from walkers.postprocess.measure.results import json_numbers
 from walkers.runner.failures import EngineFailure
 from walkers.text import aligned
 
@@ -64,7 +64,9 @@ class Line:
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types; NaN and infinity become null."""
         names = ("check", "quantity", "unit", "expected", "measured", "error", "tolerance")
-        return plain({name: getattr(self, name) for name in names}) | {"verdict": str(self.verdict)}
+        return json_numbers({name: getattr(self, name) for name in names}) | {
+            "verdict": str(self.verdict)
+        }
 
 
 def run_checks(
@@ -77,7 +79,7 @@ def run_checks(
     """Lines of checks, or ``only`` of some; a check that cannot be computed is a line. ``on_done`` gets each name."""
     for name in only:
         if name not in checks:
-            raise refused("check", f"no check {name!r}; {expected_of(name, checks)}")
+            raise input_error("check", f"no check {name!r}; {expected_of(name, checks)}")
 
     def lines_of(name: str) -> list[Line]:
         try:
@@ -102,7 +104,7 @@ def failures(lines: Iterable[Line]) -> list[Line]:
     return [line for line in lines if line.failed]
 
 
-def as_text(lines: Sequence[Line], of: str = "") -> str:
+def lines_text(lines: Sequence[Line], of: str = "") -> str:
     """A table below the name of each check, and the number of lines that pass, after the words ``of``."""
     tables = [
         f"{check}\n{_table(rows)}\n" for check, rows in groupby(lines, lambda line: line.check)

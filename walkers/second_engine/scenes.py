@@ -32,14 +32,14 @@ from walkers.physics.laws import LAWS
 from walkers.postprocess.measure.dump import BinaryDump
 from walkers.postprocess.measure.motion import prescribed_motion
 from walkers.runner.binary import Engine
-from walkers.runner.directory import write_deck
 from walkers.runner.launch import launch
+from walkers.runner.run_directory import write_deck
 from walkers.second_engine.engine import SecondEngine
 from walkers.second_engine.lines import Line
 from walkers.templates.bridge_tables import tabulated
 from walkers.templates.deck import BRIDGES_NAME, Deck, Plan, Segment, compose, plan_of
 from walkers.templates.layout import BEAD_COLUMNS, FILM_COLUMN, FORCE_COLUMNS
-from walkers.templates.placement import Bead, Scene
+from walkers.templates.placement import Bead, PlacedBodies
 from walkers.text import rendered
 
 EQUAL = 1e-6
@@ -127,7 +127,7 @@ def over(
     return Bead(0, (centre[0] + x, centre[1], centre[2]), radius, velocity, spin)
 
 
-def within(wall: Round, gap: float, radius: float, turn: float, velocity: Vector) -> Bead:
+def bead_in_cylinder(wall: Round, gap: float, radius: float, turn: float, velocity: Vector) -> Bead:
     """A bead at a gap (m) from a cylindrical wall at an azimuth (rad); velocity: radial, azimuthal, axial."""
     out, (away, along, up) = wall.radius - radius - gap, velocity
     x, y = cos(turn), sin(turn)
@@ -166,10 +166,10 @@ def moved(beads: Sequence[Bead], x: float, y: float, speed: float = 0.0) -> list
     ]
 
 
-def standing(beads: Sequence[Bead], walls: Sequence[Wall] = (FLOOR,)) -> Scene:
+def scene_of(beads: Sequence[Bead], walls: Sequence[Wall] = (FLOOR,)) -> PlacedBodies:
     """A scene of beads between walls in a box of 2 cm around the origin."""
     numbered = tuple(replace(bead, id=number) for number, bead in enumerate(beads, 1))
-    return Scene(numbered, tuple(walls), (-0.01,) * 3, (0.01,) * 3)
+    return PlacedBodies(numbered, tuple(walls), (-0.01,) * 3, (0.01,) * 3)
 
 
 def recording(steps: int, sample_every: int = 1) -> dict[str, Any]:
@@ -182,12 +182,12 @@ def recording(steps: int, sample_every: int = 1) -> dict[str, Any]:
     }
 
 
-def prescribed(case: Case, scene: Scene, steps: int = 2000, **options: Any) -> Plan:
+def prescribed(case: Case, scene: PlacedBodies, steps: int = 2000, **options: Any) -> Plan:
     """Move the beads of a scene with their velocities, recording each step."""
     return Plan(case, scene, prescribed=True, **recording(steps), **options)
 
 
-def second_engine(case: Case, scene: Scene) -> SecondEngine:
+def second_engine(case: Case, scene: PlacedBodies) -> SecondEngine:
     """The second engine with the beads of a scene."""
     start = np.array([[*bead.centre, *bead.velocity, *bead.spin] for bead in scene.beads])
     radius = np.array([bead.radius for bead in scene.beads])
@@ -196,7 +196,7 @@ def second_engine(case: Case, scene: Scene) -> SecondEngine:
 
 
 @dataclass(frozen=True)
-class Measured:
+class SceneOutput:
     """Output of a deck, SI units: F times, frames (F, N, 9: position, velocity, spin), forces and torques (F, N, 6)."""
 
     time: FloatArray
@@ -214,7 +214,7 @@ class Bench:
     stop: threading.Event = field(default_factory=threading.Event)
     version: str = "unknown"
 
-    def run(self, plan: Plan | Deck, carry: Path | None = None) -> Measured:
+    def run(self, plan: Plan | Deck, carry: Path | None = None) -> SceneOutput:
         """Run a plan that records forces, or its deck, with a file such as a restart file beside it."""
         deck = compose(plan) if isinstance(plan, Plan) else plan
         deck = replace(deck, fastest=inf)  # prescribed beads may be faster than shaken ones
@@ -230,7 +230,7 @@ class Bench:
             for name in ("x", "vx", "omegax", "fx", "tqx")
         ]
         time = dump.steps.astype(np.float64) * deck.layout.time_step
-        return Measured(
+        return SceneOutput(
             time, np.concatenate(vectors[:3], -1), np.concatenate(vectors[3:], -1), directory
         )
 
@@ -256,7 +256,7 @@ class Setting:
 
     def lines(self, name: str, bench: Bench) -> Iterator[Line]:
         """Run the scene in both engines and compare the results."""
-        case, scene = full_case(self.changes), standing(self.beads, self.walls)
+        case, scene = full_case(self.changes), scene_of(self.beads, self.walls)
         engine = second_engine(case, scene)
         if self.freely:
             every = self.freely // 100
@@ -278,7 +278,7 @@ class Setting:
             yield Line(f"{name}: {quantity}, both engines", 0.0, farthest(*both), EQUAL)
 
 
-def in_walls(case: Case, series: Measured) -> FloatArray:
+def in_walls(case: Case, series: SceneOutput) -> FloatArray:
     """Frames after the first in the frame of the walls, with the velocities used for the forces."""
     frames = series.frames[1:].copy()
     frames[..., :3] -= prescribed_motion(case.excitation, series.time[1:])[0][:, None]
@@ -317,15 +317,15 @@ SCENES: dict[str, Setting] = {
     "a bead leaves a tilted wall": Setting([over(_LEANING, -DEEP, R, WAY)], [_LEANING]),
     "beads leave a cylindrical wall": Setting(
         [
-            within(_ROUND, -DEEP, size, turn, (-0.05, 0.03, 0.02))
+            bead_in_cylinder(_ROUND, -DEEP, size, turn, (-0.05, 0.03, 0.02))
             for size, turn in ((R, 0.7), (S, 3.0))
         ],
         [_ROUND],
     ),
     "beads move along a cylindrical wall": Setting(
         [
-            within(_ROUND, -DEEP, R, 0.3, (-0.02, 0.3, 0.0)),
-            within(_ROUND, 1e-5, S, 2.0, (0.0, -0.4, 0.1)),
+            bead_in_cylinder(_ROUND, -DEEP, R, 0.3, (-0.02, 0.3, 0.0)),
+            bead_in_cylinder(_ROUND, 1e-5, S, 2.0, (0.0, -0.4, 0.1)),
         ],
         [FLOOR, _ROUND],
     ),
@@ -381,7 +381,7 @@ def restart_lines(bench: Bench) -> Iterator[Line]:
         *pair(-DEEP, 0.001, (0.001, -0.002, 0.001)),
     ]
     leaving = replace(over(FLOOR, -DEEP, S, WAY), centre=(3e-3, 0.0, S - DEEP))
-    scene = standing([*beads, leaving, *moved(pair(-DEEP, 0.04, STILL), 0.0, 3e-3)])
+    scene = scene_of([*beads, leaving, *moved(pair(-DEEP, 0.04, STILL), 0.0, 3e-3)])
     whole = bench.run(prescribed(full_case({}), scene, 1000))
     first = prescribed(full_case({}), scene, 500, restart_to="half.restart")
     carry = bench.run(first).directory / "half.restart"
@@ -400,7 +400,7 @@ def rank_lines(bench: Bench) -> Iterator[Line]:
     # The engine exchanges the beads of a pair that has crossed from one rank to the other.
     first, last = pair(-DEEP, 0.01, STILL)
     crossing = [*moved([first, last], 2.6e-3, 0.0, 0.9), *moved([last, first], 2.6e-3, 2e-3, 0.9)]
-    scene = standing([*CLIMBING, *crossing])
+    scene = scene_of([*CLIMBING, *crossing])
     single, double = (
         bench.run(prescribed(full_case({}), scene, 1000, ranks=ranks)).forces for ranks in (1, 2)
     )
@@ -420,7 +420,7 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
         "liquid.law": "soulie",
     }
     bare = bench_case({**liquid, "contact.restitution": 0.5})
-    scene = standing(pair(-DEEP, 0.05, STILL, (STILL, STILL)))
+    scene = scene_of(pair(-DEEP, 0.05, STILL, (STILL, STILL)))
     deck = compose(prescribed(bare, scene))
     meeting = surfaces_of(bare, S, R)
     fine = tabulated(by_name(bare.liquid.law), meeting, tolerance=1e-10).text()
@@ -449,7 +449,7 @@ def liquid_lines(bench: Bench, ranks: int = 1) -> Iterator[Line]:
     """Beads that fly through each other along a floor and share their liquid, in both engines."""
     draw = np.random.default_rng(3)
     liquid = {"liquid.volume_fraction": 0.02, "liquid.law": "willett"}  # whose tables take no time
-    case = bench_case(liquid).put("liquid.conserved", True)
+    case = bench_case(liquid).with_value_at("liquid.conserved", True)
     radii = draw.choice([2e-4, 2.5e-4, 3e-4], 16)
     start = np.column_stack(
         [draw.uniform(-8e-4, 8e-4, (16, 2)), radii + draw.uniform(-3e-5, 8e-5, 16)]
@@ -457,7 +457,7 @@ def liquid_lines(bench: Bench, ranks: int = 1) -> Iterator[Line]:
     velocity = np.column_stack([draw.uniform(-0.3, 0.3, (16, 2)), draw.uniform(-0.03, 0.03, 16)])
     places, speeds = map(tuple, start.tolist()), map(tuple, velocity.tolist())
     beads = [Bead(0, *bead) for bead in zip(places, radii.tolist(), speeds, strict=True)]
-    plan = prescribed(case, standing(beads), 4000, ranks=ranks)
+    plan = prescribed(case, scene_of(beads), 4000, ranks=ranks)
     plan = replace(plan, bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS, FILM_COLUMN))
     series, engine = bench.run(plan), second_engine(case, plan.scene)
     films, everything = [engine.state.film.copy()], engine.liquid()
@@ -479,11 +479,15 @@ def company_lines(bench: Bench) -> Iterator[Line]:
     alone = load_case(
         "fig1b", {"dimers.replicates": 1, "contact.rolling_friction": 0.0}
     )  # which amplifies rounding
-    alone = alone.but(run=alone.run.but(cycles=10, cycles_per_segment=10, until_steady=False))
-    stronger = alone.put("drive.peak_acceleration", 2.0 * alone.excitation.peak_acceleration)
-    sloping = alone.put("boundary.tilt", 0.3)
+    alone = alone.with_values(
+        run=alone.run.with_values(cycles=10, cycles_per_segment=10, until_steady=False)
+    )
+    stronger = alone.with_value_at(
+        "drive.peak_acceleration", 2.0 * alone.excitation.peak_acceleration
+    )
+    sloping = alone.with_value_at("boundary.tilt", 0.3)
 
-    def ran(*cases: Case) -> Measured:
+    def ran(*cases: Case) -> SceneOutput:
         return bench.run(replace(plan_of(*cases), bead_columns=(*BEAD_COLUMNS, *FORCE_COLUMNS)))
 
     first, again, together = ran(alone), ran(alone), ran(stronger, alone, sloping)

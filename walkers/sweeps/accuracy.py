@@ -13,10 +13,10 @@ from math import hypot, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.files import write_json
 from walkers.inputs.case_building import build_case
-from walkers.inputs.sweep import Sweep, expand
+from walkers.inputs.sweep import SweepDefinition, expand
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.materials import STIFFEST
 from walkers.postprocess.measure.results import recorded
@@ -24,8 +24,8 @@ from walkers.postprocess.measure.sides import STEADY_SPEED
 from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME
 from walkers.progress import Tell
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import case_of, recomputed, run_place
-from walkers.sweeps.scheduler import Options, SweepStopped, run_sweep
+from walkers.runner.run_directory import case_of, recomputed, run_place
+from walkers.sweeps.scheduler import SweepOptions, SweepStopped, run_sweep
 from walkers.sweeps.table import SIDES, main_columns, sides_differ, table_of
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ _FAMILIES = (
 
 def measure_accuracy(
     directory: Path,
-    options: Options,
+    options: SweepOptions,
     *,
     engine: str | None = None,
     on_progress: Tell | None = None,
@@ -74,7 +74,7 @@ def measure_accuracy(
     today = build_case(case.document, source=directory.name, name=case.name)
     if run_place(today, find_engine(engine), directory.parent).name != directory.name:
         text = "expected a run with the installed engine and program, and with the present library and bridge law"
-        raise refused(directory.name, f"{text}; run its case again")
+        raise input_error(directory.name, f"{text}; run its case again")
     numbers = recorded(directory)["numbers"]
     for last in range(min(2, len(possible) - 1), len(possible)):
         sweep = _sweep(case, f"{directory.name}{ACCURACY}", possible[: last + 1])
@@ -112,14 +112,16 @@ def times_of(case: Case) -> Sequence[float]:
     """Possible Young's moduli, divided by the modulus of the case; `InputError` if its error cannot be measured."""
     if not case.walkers:
         text = "no numerical error: loose beads are chaotic: their motion is different at any other time step"
-        raise refused(case.name, f"{text}; walkers climb gives the scatter over starts (run.seed)")
+        raise input_error(
+            case.name, f"{text}; walkers climb gives the scatter over starts (run.seed)"
+        )
     hardest = STIFFEST / case.contact.youngs_modulus
     possible = [times for times in _TIMES if times <= hardest * (1.0 + 1e-9)]
     further = len(possible) < len(_TIMES) and hardest >= _LEAST_INCREASE * possible[-1]
     return [*possible, hardest] if further else possible
 
 
-def _sweep(case: Case, name: str, possible: Sequence[float]) -> Sweep:
+def _sweep(case: Case, name: str, possible: Sequence[float]) -> SweepDefinition:
     """The case at half its time step, and with harder beads at steps as much smaller as the Rayleigh limit."""
     step, modulus = 1e6 * case.run.time_step, 1e-6 * case.contact.youngs_modulus
     factors = [(0.5, 1.0), *((times**-0.5, times) for times in possible[1:])]

@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.arrays import FloatArray
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.files import write_bytes
-from walkers.postprocess.measure.results import Results, plain
+from walkers.postprocess.measure.results import Results, json_numbers
 from walkers.postprocess.measure.uncertainty import guesses
 from walkers.postprocess.show.drawing import (
     TWO_COLUMNS,
@@ -67,7 +67,7 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
 
     done = frame[frame["status"] == "finished"]
     if done.empty:
-        raise refused(
+        raise input_error(
             frame.attrs["sweep"], "expected a finished run of a pile: no point is finished"
         )
     sets = [rows for _, rows in groups(done)]
@@ -86,7 +86,7 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
 
 
 def summarise_climbs(results: Sequence[Results], within: float | None = None) -> dict[str, Any]:
-    """`summary` of the climbs in runs of piles that differ only in their seed, by their results.
+    """`climb_summary` of the climbs in runs of piles that differ only in their seed, by their results.
 
     ``each`` has all climbs as in the table ``clusters``, whenever they qualified, with the names of their runs;
     ``guessed`` are the values of the case that the program guessed, as texts.
@@ -95,7 +95,7 @@ def summarise_climbs(results: Sequence[Results], within: float | None = None) ->
 
     for result in results:
         if "climbs" not in result:
-            raise refused(result.directory, "expected a finished run of a pile")
+            raise input_error(result.directory, "expected a finished run of a pile")
     piles = pd.DataFrame(
         [{name: result[name] for name in ("beads", "large", "driven")} for result in results]
     )
@@ -107,10 +107,14 @@ def summarise_climbs(results: Sequence[Results], within: float | None = None) ->
         run=[results[pile].directory.name for pile in climbs["pile"]]
     ).to_dict("records")
     guessed = guesses(results[0].about["rests_on"])
-    return {**summary(piles, climbs, within), "each": list(map(plain, records)), "guessed": guessed}
+    return {
+        **climb_summary(piles, climbs, within),
+        "each": list(map(json_numbers, records)),
+        "guessed": guessed,
+    }
 
 
-def summary(
+def climb_summary(
     piles: pd.DataFrame, climbs: pd.DataFrame, within: float | None = None
 ) -> dict[str, Any]:
     """`statistics` of all climbs, and of each of `PARTS` by the same time.
@@ -307,7 +311,7 @@ def describe_climbs(climbs: Sequence[Mapping[str, Any]]) -> str:
     return "\n\n".join([*blocks, note])
 
 
-def table_of(climbs: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+def climbing_table(climbs: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     """The results of `walkers.api.climb` as a table, SI units: a row for each condition and part of its climbs."""
     import pandas as pd
 
@@ -370,7 +374,7 @@ def climbs_figure(climbs: Sequence[Mapping[str, Any]]) -> Figure:
         }  # without climbs a layout would fail
         axes["climbs"].plot(sizes, speeds, look, label=where, **looks)
     axes["climbs"].set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
-    _draw_rates(axes["rates"], table_of(climbs))
+    _draw_rates(axes["rates"], climbing_table(climbs))
     letter_panels(axes.values())
     figure.legend(
         *axes["rates"].get_legend_handles_labels(), loc="outside lower center", ncols=len(_KINDS)
@@ -407,6 +411,6 @@ def _draw_rates(panel: Axes, table: pd.DataFrame) -> None:
 def write_climbs(climbs: Sequence[Mapping[str, Any]], runs: Sequence[str], to: Path) -> None:
     """Write the results of `walkers.api.climb` from ``runs`` as a table (.csv, SI units) or as a figure."""
     if to.suffix == ".csv":
-        write_bytes(to, table_of(climbs).to_csv(index=False).encode())
+        write_bytes(to, climbing_table(climbs).to_csv(index=False).encode())
     else:
         save_figure(climbs_figure(climbs), to, runs, [to.suffix[1:]], "How often piles climb")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.postprocess.measure.uncertainty import few_draws
-from walkers.sweeps.table import together
+from walkers.sweeps.table import walking_points
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,7 +22,7 @@ def rank_correlations(
 
     Points without a number and walkers that came apart do not count. None if the draws are too few (`few_draws`).
     """
-    points = together(done).dropna(subset=column)
+    points = walking_points(done).dropna(subset=column)
     if few_draws(len(points), len(keys)):
         return None
     ranks = {key: _rank_correlation(points[key], points[column]) for key in keys}

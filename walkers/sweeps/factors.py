@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.postprocess.measure.quantities import declared, is_declared, unit_shown
 from walkers.sweeps.table import key_values, value_text
 from walkers.text import with_unit
@@ -179,7 +179,7 @@ def numbers_of(rows: pd.DataFrame, name: str, option: str) -> Factor:
     unit, factor = unit_shown(rows.attrs["units"].get(name) or "")
     values = pd.to_numeric(rows[name], errors="coerce").to_numpy(dtype=float, na_value=np.nan)
     if len(rows) and np.isnan(values).all():
-        raise refused(option, f'"{name}" has no number that could be drawn')
+        raise input_error(option, f'"{name}" has no number that could be drawn')
     return Factor(
         (name,), readable_key(name), (values * factor).tolist(), is_number=True, unit=unit
     )

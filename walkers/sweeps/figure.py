@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 import numpy.typing as npt
 
-from walkers.errors import expected_of, refused
+from walkers.errors import expected_of, input_error
 from walkers.inputs.resolving.library import unmeasured
 from walkers.postprocess.measure.numbers import draws_text
 from walkers.postprocess.show.drawing import (
@@ -27,8 +27,8 @@ from walkers.runs.status import status_text
 from walkers.sweeps.correlations import rank_correlations
 from walkers.sweeps.factors import Factor
 from walkers.sweeps.figure_options import FigureOptions, Log
-from walkers.sweeps.layout import Layout, layout_of
-from walkers.sweeps.left_out import tell
+from walkers.sweeps.layout import FigureLayout, figure_layout
+from walkers.sweeps.left_out import warn_left_out
 from walkers.sweeps.predictions import Predict, Theory
 from walkers.sweeps.scales import scale_x, scale_y
 from walkers.sweeps.series import (
@@ -37,7 +37,7 @@ from walkers.sweeps.series import (
     draw_legend,
     draw_series,
     draw_theory,
-    looks_of,
+    level_styles,
     points_of,
 )
 from walkers.sweeps.table import FACING_DOWN, SweepTable, default_column, find_name
@@ -76,7 +76,7 @@ def figure_of(
     table
         The table of the sweep.
     options
-        What is drawn, and where (`walkers.sweeps.layout.layout_of`).
+        What is drawn, and where (`walkers.sweeps.layout.figure_layout`).
     predict
         The predictions of models; None: no theory is drawn.
 
@@ -86,17 +86,17 @@ def figure_of(
         If no point is finished, there is no such column, or keys would be hidden.
     """
     if options.log and options.log not in get_args(Log):
-        raise refused("log", f"{options.log!r}: {expected_of(options.log, get_args(Log))}")
+        raise input_error("log", f"{options.log!r}: {expected_of(options.log, get_args(Log))}")
     frame = table.frame
     column = column_of(frame, options.y)
     done = table.finished
     _tell_left_out(frame, done, column)
-    layout = layout_of(frame, done, options)
+    layout = figure_layout(frame, done, options)
     if layout.hidden:
-        tell(f"not distinguished: {'; '.join(factor.name for factor in layout.hidden)}")
+        warn_left_out(f"not distinguished: {'; '.join(factor.name for factor in layout.hidden)}")
     log = options.log or ""
     if "x" in log and not all(factor.is_number for factor in layout.along):
-        raise refused("log", f"{layout.along[0].label} has no numbers")
+        raise input_error("log", f"{layout.along[0].label} has no numbers")
     theory = Theory.at_points(table, column, log, predict) if predict else None
     down = None if options.y else FACING_DOWN.get(column)
     return _draw(done, column, layout, theory, down=down, log=log)
@@ -107,14 +107,14 @@ def _tell_left_out(frame: pd.DataFrame, done: pd.DataFrame, column: str) -> None
     counts = Counter(frame["status"][frame["status"] != "finished"])
     unfinished = status_text(counts)
     if done.empty:
-        raise refused(
+        raise input_error(
             str(frame.attrs["sweep"]), f"no point is finished ({unfinished or 'there is none'})"
         )
     if counts:
-        tell(f"{counts.total()} of {len(frame)} points left out: {unfinished}")
+        warn_left_out(f"{counts.total()} of {len(frame)} points left out: {unfinished}")
     empty = int(done[column].isna().sum())
     if empty:
-        tell(f"{empty} of {len(done)} finished points have no {column}")
+        warn_left_out(f"{empty} of {len(done)} finished points have no {column}")
 
 
 def column_of(table: pd.DataFrame, name: str | None) -> str:
@@ -135,7 +135,7 @@ class _Panel:
 def _draw(
     done: pd.DataFrame,
     column: str,
-    layout: Layout,
+    layout: FigureLayout,
     theory: Theory | None,
     *,
     down: str | None,
@@ -144,7 +144,7 @@ def _draw(
     """Draw a column of the finished points."""
     label, points = points_of(done, column, down)
     panels, remark = _panels_of(done, column, layout)
-    looks = looks_of(layout.hue, hollow=theory is not None)
+    looks = level_styles(layout.hue, hollow=theory is not None)
     figure, grid = _empty_grid(len(panels), share_x=len(layout.along) == 1)
     for axes, panel in zip(grid.flat, panels, strict=False):
         _draw_panel(axes, panel, layout.hue, looks, points, theory)
@@ -160,7 +160,7 @@ def _draw(
     return figure
 
 
-def _panels_of(done: pd.DataFrame, column: str, layout: Layout) -> tuple[list[_Panel], str]:
+def _panels_of(done: pd.DataFrame, column: str, layout: FigureLayout) -> tuple[list[_Panel], str]:
     """The panels of a layout, and a remark for the title, which may be empty."""
     if layout.panels is not None:
         panels = []

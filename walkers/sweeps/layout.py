@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from walkers.errors import InputError, refused
+from walkers.errors import InputError, input_error
 from walkers.sweeps.factors import Factor, factors_of, numbers_of, readable_key
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.table import SEEDS, find_name
@@ -19,7 +19,7 @@ NONE = "none"
 
 
 @dataclass(frozen=True)
-class Layout:
+class FigureLayout:
     """What a figure of a sweep shows where.
 
     Attributes
@@ -40,9 +40,9 @@ class Layout:
     hidden: Sequence[Factor] = ()
 
 
-def layout_of(
+def figure_layout(
     table: pd.DataFrame, rows: pd.DataFrame, options: FigureOptions = FigureOptions()
-) -> Layout:
+) -> FigureLayout:
     """The layout of a figure of some rows of a sweep's table.
 
     Without options, the x axis has the key with the most numbers, or of a sample each key in a
@@ -72,14 +72,14 @@ def layout_of(
     left = [factor for factor in factors if not factor.is_among(chosen)]
     along = [x] if x else _default_x(left, rows)
     if len(along) > 1 and panels:
-        raise refused("panels", "expected x too: the samples have a panel for each key")
+        raise input_error("panels", "expected x too: the samples have a panel for each key")
     left = [factor for factor in left if factor not in along and factor.keys[0] not in SEEDS]
     if options.hue is None:
         hue = next((factor for factor in left if not factor.is_sample), None)
     shown = [factor for factor in (hue, panels) if factor]
     shown += [factor for factor in factors if factor.is_among(along) and not factor.is_sample]
     hidden = [factor for factor in left if not _follows_from(shown, factor)]
-    layout = Layout(along, hue, panels, hidden)
+    layout = FigureLayout(along, hue, panels, hidden)
     if NONE not in (options.hue, options.panels):
         _check_all_shown(layout)
     return layout
@@ -138,14 +138,14 @@ def _follows_from(shown: Sequence[Factor], factor: Factor) -> bool:
     return True
 
 
-def _check_all_shown(layout: Layout) -> None:
+def _check_all_shown(layout: FigureLayout) -> None:
     """Refuse a layout that hides keys of the sweep; it cannot show the keys of a sample."""
     hidden = [factor.keys[0] for factor in layout.hidden if not factor.is_sample]
     if hidden:
         raise _hides(layout, hidden)
 
 
-def _hides(layout: Layout, hidden: Sequence[str]) -> InputError:
+def _hides(layout: FigureLayout, hidden: Sequence[str]) -> InputError:
     """An error that says which keys the figure does not show, and how it can."""
     shown = [f"{factor.keys[0]} (x)" for factor in layout.along]
     if layout.hue:
@@ -156,7 +156,7 @@ def _hides(layout: Layout, hidden: Sequence[str]) -> InputError:
         f"{', '.join(hidden)} {'varies' if len(hidden) == 1 else 'vary'} beside {', '.join(shown)}"
     )
     if layout.panels:
-        return refused(
+        return input_error(
             "hue",
             f"{vary}: expected fewer keys in the sweep file, or none to draw all values alike",
         )
@@ -164,4 +164,4 @@ def _hides(layout: Layout, hidden: Sequence[str]) -> InputError:
         advice = "expected one of them, with the others fixed in the sweep file"
     else:
         advice = f"expected {hidden[0]}"
-    return refused("panels", f"{vary}: {advice}, or none to draw all values alike")
+    return input_error("panels", f"{vary}: {advice}, or none to draw all values alike")

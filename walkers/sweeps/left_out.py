@@ -9,6 +9,6 @@ class LeftOutWarning(UserWarning):
     """Something is not in a figure: points without a result, keys that are not distinguished, a theory's prediction."""
 
 
-def tell(message: str) -> None:
+def warn_left_out(message: str) -> None:
     """Warn that something is not in a figure."""
     warnings.warn(message, LeftOutWarning, stacklevel=3)

@@ -12,13 +12,13 @@ from walkers.errors import InputError
 from walkers.postprocess.measure.uncertainty import ACCURACY, SPREAD
 from walkers.rounding import counted
 from walkers.runs.case_text import FlatCase
-from walkers.runs.listing import Entry, by_case, bytes_text, folders_in, runs_in
+from walkers.runs.listing import ListEntry, by_case, bytes_text, folders_in, runs_in
 from walkers.runs.status import status_text, worst_status
-from walkers.sweeps.record import RECORD_NAME, read_record, states
+from walkers.sweeps.record import RECORD_NAME, read_sweep_record, states
 from walkers.text import aligned
 
 
-def inventory(out: Path) -> list[Entry]:
+def inventory(out: Path) -> list[ListEntry]:
     """All sweeps and runs in a folder, sweeps first, each sorted by name.
 
     Raises
@@ -38,10 +38,10 @@ def inventory(out: Path) -> list[Entry]:
     return [*sweeps, *runs]
 
 
-def _sweep(path: Path, size_of: Mapping[str, int]) -> Entry | None:
+def _sweep(path: Path, size_of: Mapping[str, int]) -> ListEntry | None:
     """The sweep in a directory; None if there is none, or its record cannot be read."""
     try:
-        record = read_record(path)
+        record = read_sweep_record(path)
     except InputError:
         return None
     points = dict(Counter(state.status for state in states(record)))
@@ -49,7 +49,7 @@ def _sweep(path: Path, size_of: Mapping[str, int]) -> Entry | None:
     numbers_of_values = FlatCase()
     for key, values in zip(sweep.keys, zip(*sweep.values, strict=True), strict=True):
         numbers_of_values[key] = len({str(value) for value in values})
-    return Entry(
+    return ListEntry(
         kind="sweep",
         name=path.name,
         case=sweep.case_name,
@@ -63,7 +63,7 @@ def _sweep(path: Path, size_of: Mapping[str, int]) -> Entry | None:
     )
 
 
-def run_of(sweep: str) -> str:
+def run_of_sweep(sweep: str) -> str:
     """Name of the run whose spread or accuracy a sweep is; empty for other sweeps."""
     for ending in (SPREAD, ACCURACY):
         if sweep.endswith(ending):
@@ -71,14 +71,14 @@ def run_of(sweep: str) -> str:
     return ""
 
 
-def without_members(contents: Sequence[Entry]) -> list[Entry]:
+def without_members(contents: Sequence[ListEntry]) -> list[ListEntry]:
     """Contents without the runs of sweeps, unless these have a spread or an accuracy of their own."""
     members = {run for sweep in contents for run in sweep.runs or ()}
-    members -= {run_of(entry.name) for entry in contents}
+    members -= {run_of_sweep(entry.name) for entry in contents}
     return [entry for entry in contents if entry.name not in members]
 
 
-def as_json(contents: Sequence[Entry]) -> list[dict[str, Any]]:
+def as_json(contents: Sequence[ListEntry]) -> list[dict[str, Any]]:
     """Entries as JSON objects, SI units.
 
     ``varies`` of a run has the values by which the runs of its case differ.
@@ -94,7 +94,7 @@ def as_json(contents: Sequence[Entry]) -> list[dict[str, Any]]:
     return rows
 
 
-def as_text(contents: Sequence[Entry], hidden: int = 0) -> str:
+def listing_text(contents: Sequence[ListEntry], hidden: int = 0) -> str:
     """Entries as text: sweeps, then the runs of each case; velocities in mm/s.
 
     The last line states the number of ``hidden`` runs of sweeps.
@@ -113,7 +113,7 @@ def as_text(contents: Sequence[Entry], hidden: int = 0) -> str:
     return "\n\n".join([*blocks, total])
 
 
-def _sweeps_text(sweeps: Sequence[Entry]) -> str:
+def _sweeps_text(sweeps: Sequence[ListEntry]) -> str:
     lines = [["sweep", "points", "age", "size", "case", "varies (values)"]]
     for sweep in sweeps:
         varied = ", ".join(f"{key} ({number})" for key, number in sweep.parameters.items())
@@ -122,5 +122,5 @@ def _sweeps_text(sweeps: Sequence[Entry]) -> str:
     return aligned(lines)
 
 
-def _runs(contents: Sequence[Entry]) -> list[Entry]:
+def _runs(contents: Sequence[ListEntry]) -> list[ListEntry]:
     return [entry for entry in contents if entry.kind == "run"]

@@ -17,7 +17,7 @@ from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.quantities import unit_shown
 from walkers.postprocess.measure.results import derived
 from walkers.sweeps.factors import Factor
-from walkers.sweeps.left_out import tell
+from walkers.sweeps.left_out import warn_left_out
 from walkers.sweeps.table import SweepTable
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class Theory:
         cases = list(table.cases.values())
         predicted, remarks = predict(cases, column)
         for remark, number in remarks.items():
-            tell(f"{number} of {len(done)} points: {remark}")
+            warn_left_out(f"{number} of {len(done)} points: {remark}")
         if not predicted:
             return None
         values = _shown(done, column, predicted)
@@ -106,7 +106,7 @@ class Theory:
             return of_points
         if not all(np.isfinite(values).all() for values in predicted.values()):
             for remark in remarks.keys() - self.remarks:
-                tell(f"the theory's curve has gaps: {remark}")
+                warn_left_out(f"the theory's curve has gaps: {remark}")
         along = numbers
         name = x.keys[0]
         if name != key:

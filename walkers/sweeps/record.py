@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from walkers.errors import InputError, refused
+from walkers.errors import InputError, input_error
 from walkers.files import make_folder, read_json, write_json
-from walkers.postprocess.measure.results import read
+from walkers.postprocess.measure.results import read_results
 from walkers.runs.status import PointState, state_at
 
 if TYPE_CHECKING:
-    from walkers.inputs.sweep import Sweep
+    from walkers.inputs.sweep import SweepDefinition
 
 RECORD_NAME = "sweep.json"
 _FORMAT = 4
@@ -31,7 +31,7 @@ class SweepRecord:
     """A sweep in its directory, with the name of the run of each point."""
 
     directory: Path
-    sweep: Sweep
+    sweep: SweepDefinition
     runs: Sequence[str]
 
     @property
@@ -53,7 +53,7 @@ def write_record(record: SweepRecord) -> None:
     write_json(record.directory / RECORD_NAME, {**contents, "runs": list(record.runs)})
 
 
-def read_record(directory: str | Path) -> SweepRecord:
+def read_sweep_record(directory: str | Path) -> SweepRecord:
     """Read the record in a sweep's directory, and expand the sweep; `InputError` if there is none."""
     from walkers.inputs.sweep import expand
 
@@ -71,14 +71,14 @@ def read_record(directory: str | Path) -> SweepRecord:
             raise ValueError(f"{len(runs)} runs, expected the names of {len(sweep.rows)}")
         return SweepRecord(directory, sweep, runs)
     except (FileNotFoundError, NotADirectoryError) as error:
-        raise refused(
+        raise input_error(
             named, f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"
         ) from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         text = (
             f"{RECORD_NAME} cannot be read ({error}); run the sweep again: finished runs are kept"
         )
-        raise refused(named, text) from error
+        raise input_error(named, text) from error
 
 
 def states(record: SweepRecord, *, results: bool = False) -> list[PointState]:
@@ -87,7 +87,7 @@ def states(record: SweepRecord, *, results: bool = False) -> list[PointState]:
     for number, state in enumerate(points if results else ()):
         if state.status == "finished" and state.directory is not None:
             try:
-                points[number] = replace(state, result=read(state.directory))
+                points[number] = replace(state, result=read_results(state.directory))
             except InputError as error:
                 points[number] = PointState("failed", state.directory, UNREADABLE, str(error))
     return points

@@ -6,11 +6,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from walkers.errors import refused
-from walkers.runs.listing import Entry, place_of
-from walkers.runs.removal import Kind, Removal, is_removable, removal_of
-from walkers.sweeps.listing import inventory, run_of
-from walkers.sweeps.record import RECORD_NAME, read_record
+from walkers.errors import input_error
+from walkers.runs.listing import ListEntry, place_of
+from walkers.runs.removal import Removal, RemovalKind, is_removable, removal_of
+from walkers.sweeps.listing import inventory, run_of_sweep
+from walkers.sweeps.record import RECORD_NAME, read_sweep_record
 
 
 def named_in(out: Path, places: Sequence[Path]) -> list[Removal]:
@@ -32,7 +32,7 @@ def named_in(out: Path, places: Sequence[Path]) -> list[Removal]:
     """
     contents = inventory(out)
     for record in out.glob(f"*/{RECORD_NAME}"):
-        read_record(record.parent)  # which runs it needs must be known
+        read_sweep_record(record.parent)  # which runs it needs must be known
     directories = set()
     names = set()
     for place in places:
@@ -48,14 +48,14 @@ def named_in(out: Path, places: Sequence[Path]) -> list[Removal]:
     return [_removal_of(entry, going, runs_of) for entry in removed]
 
 
-def _at(place: Path, contents: Sequence[Entry]) -> list[Entry]:
+def _at(place: Path, contents: Sequence[ListEntry]) -> list[ListEntry]:
     """The entry of a directory, or the entries of the run that belongs in a place."""
     resolved = place.resolve()
     entries = [entry for entry in contents if entry.directory.resolve() == resolved]
     if not entries:
         entries = [entry for entry in contents if place_of(entry.directory).resolve() == resolved]
     if not entries:
-        raise refused(place, "no run or sweep in the folder of runs (see walkers list)")
+        raise input_error(place, "no run or sweep in the folder of runs (see walkers list)")
     return entries
 
 
@@ -78,7 +78,7 @@ def _with_members(names: Collection[str], runs_of: Mapping[str, Collection[str]]
                 members.update(runs)
             else:
                 needed.update(runs)
-            if run_of(sweep) in going:
+            if run_of_sweep(sweep) in going:
                 members.add(sweep)
         members -= needed
         if members <= going:
@@ -87,16 +87,16 @@ def _with_members(names: Collection[str], runs_of: Mapping[str, Collection[str]]
 
 
 def _removal_of(
-    entry: Entry, going: Collection[str], runs_of: Mapping[str, Collection[str]]
+    entry: ListEntry, going: Collection[str], runs_of: Mapping[str, Collection[str]]
 ) -> Removal:
     """The removal of a run or a sweep; `InputError` if a process is computing the run."""
     if entry.kind == "sweep":
         remark = "a symbolic link: its target stays"
         if not entry.directory.is_symlink():
             remark = ", ".join(sorted(path.name for path in entry.directory.iterdir()))
-        return Removal(entry.directory, Kind.SWEEP, remark=remark)
+        return Removal(entry.directory, RemovalKind.SWEEP, remark=remark)
     if not is_removable(entry):
-        raise refused(entry.name, "expected a run that is not in progress")
+        raise input_error(entry.name, "expected a run that is not in progress")
     removal = removal_of(entry)
     needed_by = [
         sweep for sweep, runs in runs_of.items() if sweep not in going and entry.name in runs

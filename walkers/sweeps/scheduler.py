@@ -37,8 +37,8 @@ from pathlib import Path
 from platform import node
 from typing import TYPE_CHECKING, TypeAlias
 
-from walkers.errors import InputError, Problem, Stopped, WalkersError, check_utf8, refused
-from walkers.inputs.sweep import Sweep
+from walkers.errors import InputError, Problem, Stopped, WalkersError, check_utf8, input_error
+from walkers.inputs.sweep import SweepDefinition
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.results import ensure_measured
 from walkers.progress import Progress, Tell
@@ -51,7 +51,6 @@ from walkers.runner.cost import (
     predicted_overhead,
     predicted_seconds,
 )
-from walkers.runner.directory import is_finished, is_locked, run_place, unfinished
 from walkers.runner.failures import (
     DiskFull,
     EngineDiffers,
@@ -60,13 +59,14 @@ from walkers.runner.failures import (
     ProgramDiffers,
 )
 from walkers.runner.launch import cores_here
+from walkers.runner.run_directory import is_finished, is_locked, run_place, unfinished
 from walkers.runs.making import make_runs, progress_at
 from walkers.runs.status import PointState, status_text
 from walkers.sweeps.record import (
     RECORD_NAME,
     UNREADABLE,
     SweepRecord,
-    read_record,
+    read_sweep_record,
     states,
     write_record,
 )
@@ -101,7 +101,7 @@ class SweepStopped(WalkersError):
 
 
 @dataclass(frozen=True)
-class Options:
+class SweepOptions:
     """Options of a sweep: cores of this machine (``workers``, None: all), or a cluster; MPI processes of a deck.
 
     An ``executor`` that is handed over runs as many decks at once as there are ``workers``. Failures with the names
@@ -124,11 +124,11 @@ class Options:
         workers = self.workers or cores_here()
         return workers if self.executor is not None else max(1, workers // self.ranks)
 
-    def for_ranks(self, ranks: int) -> Options:
+    def for_ranks(self, ranks: int) -> SweepOptions:
         """The same options for decks with a number of MPI processes; `InputError` if a node has fewer cores."""
         options = replace(self, ranks=ranks)
         if not options.decks_at_once:
-            raise refused(
+            raise input_error(
                 "cores",
                 f"a deck has {ranks} MPI processes (run.ranks), more than the cores of a node",
             )
@@ -261,7 +261,7 @@ class SweepPlan:
     engine: Engine
     decks: Sequence[PlannedDeck]
     statuses: Sequence[str]
-    options: Options
+    options: SweepOptions
     final: list[Failure]
 
     @cached_property
@@ -307,7 +307,7 @@ class SweepPlan:
         )
 
 
-def _resolved(sweep: Sweep, tell: Tell) -> list[Case]:
+def _resolved(sweep: SweepDefinition, tell: Tell) -> list[Case]:
     """The cases of all points, which take a second for two thousand."""
     cases: list[Case] = []
     points = len(sweep.rows)
@@ -322,9 +322,9 @@ def _resolved(sweep: Sweep, tell: Tell) -> list[Case]:
 
 
 def plan_sweep(
-    sweep: Sweep,
+    sweep: SweepDefinition,
     out: Path,
-    options: Options,
+    options: SweepOptions,
     engine: str | None = None,
     on_progress: Tell | None = None,
 ) -> SweepPlan:
@@ -367,9 +367,9 @@ def _failures(
 
 
 def run_sweep(
-    sweep: Sweep,
+    sweep: SweepDefinition,
     out: Path,
-    options: Options,
+    options: SweepOptions,
     *,
     engine: str | None = None,
     on_progress: Tell | None = None,
@@ -385,7 +385,7 @@ def run_sweep(
     if plan.decks:
         check_audit(plan.engine)
     with suppress(InputError):  # no sweep of this name, or none that can be read
-        if not set(read_record(record.directory).runs) & set(record.runs):
+        if not set(read_sweep_record(record.directory).runs) & set(record.runs):
             text = "replaces a sweep of the same name without common runs; figures and reports there show the old one"
             warnings.warn(f"{record.directory}: {text}", SweepReplacedWarning, stacklevel=2)
     write_record(record)
@@ -402,7 +402,7 @@ def run_sweep(
             failures = _Loop(plan, executor, stop).run(on_progress or (lambda _: None))
     if not (record.directory / RECORD_NAME).is_file():
         raise OutputGone(record.directory)
-    if list(read_record(record.directory).runs) != list(record.runs):
+    if list(read_sweep_record(record.directory).runs) != list(record.runs):
         raise SweepStopped(
             f"{record.directory} was replaced by another sweep of the same name; the runs are kept"
         )
@@ -461,7 +461,7 @@ def work(
 
 @contextmanager
 def _workers(
-    options: Options, record: SweepRecord
+    options: SweepOptions, record: SweepRecord
 ) -> Iterator[tuple[Executor, threading.Event | None]]:
     """The executor of a sweep, and the event that stops its threads; threads and Parsl's workers end with it."""
     if options.executor is not None:

@@ -110,7 +110,7 @@ def points_of(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, p
     return factor.label, points
 
 
-def looks_of(hue: Factor | None, *, hollow: bool) -> dict[Any, dict[str, Any]]:
+def level_styles(hue: Factor | None, *, hollow: bool) -> dict[Any, dict[str, Any]]:
     """Colour, symbol and its size for each level of a factor; for the level None without a factor."""
     from matplotlib import colormaps
     from matplotlib.colors import to_hex

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.extras import require
 from walkers.inputs.messages import validated
 from walkers.inputs.toml import read_toml
@@ -108,11 +108,11 @@ def load_site(path: str | Path) -> Config:
     try:
         config = runpy.run_path(str(path)).get("config")
     except Exception as error:  # whatever the user's file raises
-        raise refused(
+        raise input_error(
             path, f"cannot be used: {type(error).__name__}: {' '.join(str(error).split())}"
         ) from error
     if not isinstance(config, Config):
-        raise refused(path, "expected a configuration: config = parsl.Config(...)")
+        raise input_error(path, "expected a configuration: config = parsl.Config(...)")
     return config
 
 
@@ -123,7 +123,7 @@ def check_path(folder: Path) -> None:
         (printable(folder.name), folder.name),
     ):
         if odd := _ODD.search(text):
-            raise refused(
+            raise input_error(
                 source,
                 f"with a site file expected {_TAKEN} in the path, found {odd[0]!r} in {text!r}",
             )

@@ -9,12 +9,12 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import InputError, check_limits, refused, unusable
+from walkers.errors import InputError, check_limits, input_error, key_error
 from walkers.files import write_json
 from walkers.inputs.axes import Range, ranges_of, unit_cube, written
-from walkers.inputs.messages import blaming
+from walkers.inputs.messages import attributed_to
 from walkers.inputs.origins import Origin
-from walkers.inputs.sweep import Sweep, expand
+from walkers.inputs.sweep import SweepDefinition, expand
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.measure.numbers import MAIN
@@ -31,14 +31,14 @@ from walkers.postprocess.measure.uncertainty import (
 from walkers.progress import Tell
 from walkers.rounding import counted, rounded
 from walkers.runner.binary import find_engine
-from walkers.runner.directory import run_place
-from walkers.runs.case_text import kind_of
+from walkers.runner.run_directory import run_place
+from walkers.runs.case_text import quantity_kind
 from walkers.sweeps.correlations import rank_correlations
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.left_out import LeftOutWarning
-from walkers.sweeps.record import read_record
-from walkers.sweeps.scheduler import Failure, Options, run_sweep
-from walkers.sweeps.table import main_columns, table_of, together
+from walkers.sweeps.record import read_sweep_record
+from walkers.sweeps.scheduler import Failure, SweepOptions, run_sweep
+from walkers.sweeps.table import main_columns, table_of, walking_points
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -95,7 +95,7 @@ def _range_of(value: Origin) -> dict[str, list[Any]]:
         value.range or (None, None),
     )
     ends: Range = ranges_of({value.key: {name: [low, high]}})[value.key]
-    kind = kind_of(value.key)
+    kind = quantity_kind(value.key)
     try:
         unit = parse_quantity(f"1 {ends.unit}", kind) if kind and ends.unit else 1.0
         usual = (
@@ -105,11 +105,11 @@ def _range_of(value: Origin) -> dict[str, list[Any]]:
         return {name: [low, high]}
     if not ends.low * (1.0 - 1e-9) <= usual <= ends.high * (1.0 + 1e-9):
         message = f"expected a range that holds the case's own value, {value.text}"
-        raise unusable(f"uncertain.{value.key}", message, [low, high])
+        raise key_error(f"uncertain.{value.key}", message, [low, high])
     return {name: [low, written(min(max(usual, ends.low), ends.high), ends.unit), high]}
 
 
-def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> Sweep:
+def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> SweepDefinition:
     """A sweep over the uncertain values of a case by Sobol's sequence, scrambled for the least correlated columns.
 
     Half of the draws are at or below the value of the case. `InputError` if no value is uncertain, a range does not
@@ -121,8 +121,8 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
     varied = [value for value in case.origins if value.range is not None]
     if not varied:
         message = "no value is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
-        raise refused(case.name, message)
-    with blaming(case.name, case.document):
+        raise input_error(case.name, message)
+    with attributed_to(case.name, case.document):
         ranges = {value.key: _range_of(value) for value in varied}
 
     def likeness(seed: int) -> float:
@@ -142,7 +142,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
 def run_spread(
     case: Case,
     out: Path,
-    options: Options,
+    options: SweepOptions,
     *,
     points: int = POINTS,
     engine: str | None = None,
@@ -175,7 +175,7 @@ def spread_in(
 ) -> Spread:
     """The spread of a case by the table of its sweep in a directory."""
     table = table[table["status"] == "finished"]
-    whole, counts = together(table), {}
+    whole, counts = walking_points(table), {}
     if "velocity" in table:
         speeds = whole[main_columns(whole)[0]]
         counts = {"forward": int((speeds > REST).sum()), "backward": int((speeds < -REST).sum())}
@@ -215,11 +215,11 @@ def figures_of_spread(run: Path) -> dict[str, Figure]:
     if (directory / SPREAD_NAME).is_file():
         with suppress(InputError), warnings.catch_warnings():
             warnings.simplefilter("ignore", LeftOutWarning)
-            return {"spread": figure_of(table_of(read_record(directory)))}
+            return {"spread": figure_of(table_of(read_sweep_record(directory)))}
     return {}
 
 
-def describe(spread: Spread) -> str:
+def spread_text(spread: Spread) -> str:
     """A spread in a few lines: mm, mm/s."""
     points = max((band["points"] for band in spread.bands.values()), default=0)
     half = "half of them at or below the value of the case"

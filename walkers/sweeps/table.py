@@ -19,7 +19,7 @@ from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import InputError, refused, suggestion
+from walkers.errors import InputError, input_error, suggestion
 from walkers.files import json_bytes, write_bytes
 from walkers.inputs.axes import ranges_of
 from walkers.inputs.origins import text_of
@@ -34,16 +34,16 @@ from walkers.postprocess.measure.quantities import (
 from walkers.postprocess.measure.results import Results, modules_of
 from walkers.postprocess.measure.sides import SEPARATED
 from walkers.rounding import counted, rounded
-from walkers.runner.directory import case_of
+from walkers.runner.run_directory import case_of
 from walkers.runs.case_text import short_keys
 from walkers.runs.status import PointState, status_text
-from walkers.sweeps.record import SweepRecord, read_record, states
+from walkers.sweeps.record import SweepRecord, read_sweep_record, states
 from walkers.text import aligned, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from walkers.inputs.sweep import Sweep
+    from walkers.inputs.sweep import SweepDefinition
     from walkers.inputs.tables.case import Case
 
 STATE = {
@@ -63,7 +63,7 @@ FACING_DOWN = {"right_facing": "left_facing", "axial_velocity": "axial_left_faci
 """Columns of walkers that face down, by the columns of those that face up (`main_columns`)."""
 SEEDS = ("run.seed", "seed")
 """Keys of the random numbers of a start: points that differ in nothing else repeat an experiment."""
-FORMATS = ("csv", "parquet", "json")
+TABLE_FORMATS = ("csv", "parquet", "json")
 _SHOWN = {
     *(
         "gamma0",
@@ -103,7 +103,7 @@ class SweepTable:
     Attributes
     ----------
     frame
-        One row per point, as from `load`.
+        One row per point, as from `load_table`.
     results
         Results of the finished points by their numbers.
     """
@@ -131,7 +131,7 @@ class SweepTable:
         return list(results.values())
 
 
-def load(directory: str | Path) -> pd.DataFrame:
+def load_table(directory: str | Path) -> pd.DataFrame:
     """The table of a sweep in a directory such as ``runs/fig2``.
 
     Returns
@@ -145,7 +145,7 @@ def load(directory: str | Path) -> pd.DataFrame:
     InputError
         If there is no sweep.
     """
-    return table_of(read_record(directory)).frame
+    return table_of(read_sweep_record(directory)).frame
 
 
 def table_of(record: SweepRecord) -> SweepTable:
@@ -157,7 +157,7 @@ def table_of(record: SweepRecord) -> SweepTable:
     return SweepTable(_frame(record.sweep, points), results)
 
 
-def _frame(sweep: Sweep, points: Sequence[PointState]) -> pd.DataFrame:
+def _frame(sweep: SweepDefinition, points: Sequence[PointState]) -> pd.DataFrame:
     """The data frame of a sweep, with descriptions of its columns and of the sweep."""
     import pandas as pd
 
@@ -189,7 +189,7 @@ def _frame(sweep: Sweep, points: Sequence[PointState]) -> pd.DataFrame:
     return frame
 
 
-def _varied_columns(sweep: Sweep) -> dict[str, tuple[str, str]]:
+def _varied_columns(sweep: SweepDefinition) -> dict[str, tuple[str, str]]:
     """Unit and meaning of the columns of the varied keys.
 
     A key with several numbers has a column for each. If it has a word at other points, such as an
@@ -207,7 +207,7 @@ def _varied_columns(sweep: Sweep) -> dict[str, tuple[str, str]]:
     return columns
 
 
-def _declared(sweep: Sweep) -> list[str]:
+def _declared(sweep: SweepDefinition) -> list[str]:
     """The numbers of results of a sweep's cases, without numbers of single beads; empty if a case cannot be read."""
     with suppress(InputError):
         groups = [module.NAME for module in modules_of(next(sweep.cases()))]
@@ -220,7 +220,7 @@ def _declared(sweep: Sweep) -> list[str]:
     return []
 
 
-def _row(number: int, sweep: Sweep, state: PointState) -> dict[str, Any]:
+def _row(number: int, sweep: SweepDefinition, state: PointState) -> dict[str, Any]:
     row: dict[str, Any] = {"point": number, **(state.result or {})}
     for key, value in zip(sweep.keys, sweep.values[number], strict=True):
         row |= (
@@ -252,7 +252,7 @@ def groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]
         yield dict(zip(keys, values, strict=True)), frame.loc[rows.index]
 
 
-def together(frame: pd.DataFrame) -> pd.DataFrame:
+def walking_points(frame: pd.DataFrame) -> pd.DataFrame:
     """The points of a sweep's table without those whose walkers came apart, which have no velocity."""
     return (
         frame[~(frame["separated_fraction"] > SEPARATED)]
@@ -291,7 +291,7 @@ def find_name(option: str, word: str, names: Iterable[str]) -> str:
     if len(matches) == 1:
         return matches[0]
     text = f"expected one of {', '.join(matches or candidates)}{'' if matches else suggestion(word, candidates)}"
-    raise refused(option, f'"{word}": {text}')
+    raise input_error(option, f'"{word}": {text}')
 
 
 def value_text(value: Any, unit: str | None = None) -> str:
@@ -356,9 +356,9 @@ def encoded(frame: pd.DataFrame, form: str) -> bytes:
 
 
 def write_table_file(frame: pd.DataFrame, path: Path) -> None:
-    """Write a table in the format of the file's suffix; `InputError` if it is none of `FORMATS`."""
-    if path.suffix.lstrip(".") not in FORMATS:
-        raise refused(path, f"expected a name that ends in .{', .'.join(FORMATS)}")
+    """Write a table in the format of the file's suffix; `InputError` if it is none of `TABLE_FORMATS`."""
+    if path.suffix.lstrip(".") not in TABLE_FORMATS:
+        raise input_error(path, f"expected a name that ends in .{', .'.join(TABLE_FORMATS)}")
     write_bytes(path, encoded(frame, path.suffix.lstrip(".")))
 
 
@@ -418,7 +418,9 @@ def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
     import pandas as pd
 
     if (until_below := frame.attrs["until_below"]) is None:
-        raise refused(frame.attrs["sweep"], "the sweep has no descent and therefore no thresholds")
+        raise input_error(
+            frame.attrs["sweep"], "the sweep has no descent and therefore no thresholds"
+        )
     *kept, lowered = frame.attrs["varied"]
     rows = []
     for _, points in frame.groupby(frame["point"] // frame[lowered].nunique()):

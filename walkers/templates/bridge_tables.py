@@ -28,7 +28,7 @@ _COARSEST, _FINEST = 8, 256
 
 
 @dataclass(frozen=True)
-class Table:
+class BridgeTable:
     """The table of a law for two surfaces, as the engine reads it: a curve, the grid (``scale`` in m), and forces.
 
     ``rows`` are the forces at its gaps, shape (3 cells (octaves + 2) + 1, 5), as `walkers.physics.bridge.Forces`.
@@ -89,14 +89,14 @@ class Table:
 
 
 @lru_cache(maxsize=4096)
-def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) -> Table:
+def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) -> BridgeTable:
     """Tabulate a law as finely as the tolerance requires; raises `UnusableLawError` if that is not possible."""
     curve = law(surfaces)
     scale = curve.scale or surfaces.roughness
     octaves = max(int(log2(1.0 + 0.5 * curve.rupture / scale)), int(curve.rupture > scale))
     cells = _COARSEST
     while cells <= _FINEST:
-        table = Table(curve, scale, octaves, cells, np.empty(0))
+        table = BridgeTable(curve, scale, octaves, cells, np.empty(0))
         table = replace(table, rows=columns_at(curve, table.gaps))
         worst, gap = _error(table)
         if worst <= tolerance:
@@ -108,7 +108,7 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
     )
 
 
-def _error(table: Table) -> tuple[float, float]:
+def _error(table: BridgeTable) -> tuple[float, float]:
     """The largest relative error of the engine's interpolation between rows, and its gap (m)."""
     gaps = table.within(np.array([1.0 / 6.0, 0.5, 5.0 / 6.0]))
     exact = columns_at(table.curve, gaps)
@@ -187,5 +187,5 @@ def _recorded(text: str) -> Curve:
     formation, rupture, scale, octaves, cells = map(float, head.split())
     rows = np.array([[float(word) for word in line.split()] for line in lines])
     curve = Curve(lambda gaps: Forces(*table.interpolated(gaps).T), rupture, formation, scale)
-    table = Table(curve, scale, int(octaves), int(cells), rows[:, 1:])
+    table = BridgeTable(curve, scale, int(octaves), int(cells), rows[:, 1:])
     return curve

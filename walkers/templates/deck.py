@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from walkers.arrays import Vector
 from walkers.errors import InputError, Problem
 from walkers.inputs.resolving.length import limits_of
-from walkers.inputs.resolving.loads import bridge_at_rest, hop_height, reach
+from walkers.inputs.resolving.loads import bridge_at_rest, hop_height, path_length
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import AXES, Excitation
 from walkers.physics.capillary import bead_volume
@@ -20,10 +20,10 @@ from walkers.templates.layout import (
     BEAD_COLUMNS,
     FILM_COLUMN,
     MEAN_SPIN_COLUMNS,
-    Layout,
+    DeckLayout,
     PlacedWalker,
 )
-from walkers.templates.placement import Scene, Surface, place, surface_of
+from walkers.templates.placement import PlacedBodies, Surface, place, surface_of
 from walkers.text import rendered
 
 DECK_NAME = "walker.lig"
@@ -84,7 +84,7 @@ class Deck:
 
     text: str  # the input script
     files: Mapping[str, str]  # further input files, name to text
-    layout: Layout  # of its output
+    layout: DeckLayout  # of its output
     box: tuple[Vector, Vector]  # corners of the simulation box, m
     fastest: float  # a speed that no bead can reach by the drive, gravity and the capillary forces alone, m/s
     silence: float  # how long the engine may write nothing, s
@@ -108,13 +108,13 @@ class Plan:
     """Contents of a deck."""
 
     case: Case  # materials, liquid, contacts, drive, gravity and time step
-    scene: Scene
+    scene: PlacedBodies
     segment: Segment
     sample_every: int  # steps between frames of beads, …
     bridge_every: int  # … of bridges …
     status_every: int  # … and lines of the engine's log
     bead_columns: tuple[str, ...] = BEAD_COLUMNS
-    wall_bridge_columns: tuple[str, ...] = Layout.wall_bridge_columns
+    wall_bridge_columns: tuple[str, ...] = DeckLayout.wall_bridge_columns
     walkers: tuple[PlacedWalker, ...] = ()  # with the ids of their beads
     prescribed: bool = False  # beads keep their velocities instead of following the forces
     ranks: int = 1  # number of MPI processes
@@ -289,7 +289,9 @@ def _start(drive: Excitation) -> list[float]:
     return [sum(direction[axis] * speed for direction, speed in moved) for axis in range(3)]
 
 
-def tables_of(case: Case, surfaces: Sequence[Surface], sizes: Collection[tuple[int, float]]) -> str:
+def bridge_tables_of(
+    case: Case, surfaces: Sequence[Surface], sizes: Collection[tuple[int, float]]
+) -> str:
     """`bridge_tables` of a case, or of cases with its law; raises `InputError` if the law cannot be used."""
     from walkers.templates.bridge_tables import bridge_tables
 
@@ -299,10 +301,10 @@ def tables_of(case: Case, surfaces: Sequence[Surface], sizes: Collection[tuple[i
         raise InputError(case.name, [Problem("liquid.law", case.liquid.law, str(error))]) from error
 
 
-def _tables_of_scene(case: Case, scene: Scene) -> str:
+def _tables_of_scene(case: Case, scene: PlacedBodies) -> str:
     """The bridge tables of the beads of a scene, whose cases have the law of this one."""
     sizes = {(bead.surface, bead.radius) for bead in scene.beads}
-    return tables_of(case, scene.surfaces or (surface_of(case),), sizes)
+    return bridge_tables_of(case, scene.surfaces or (surface_of(case),), sizes)
 
 
 def bridge_tables_digest(case: Case) -> str:
@@ -316,7 +318,7 @@ def bridge_tables_digest(case: Case) -> str:
     return hashlib.sha256(tables.encode("utf-8", "surrogateescape")).hexdigest()
 
 
-def _loads(scene: Scene) -> str:
+def _loads(scene: PlacedBodies) -> str:
     """Gravity and the amplitude of each harmonic for beads whose loading is not the first, as the engine reads them."""
     return "".join(
         " ".join(
@@ -363,7 +365,7 @@ def processor_grid(plan: Plan) -> tuple[int, int]:
     return along_x, plan.ranks // along_x
 
 
-def _beads_data(scene: Scene, density: float, types: int) -> str:
+def _beads_data(scene: PlacedBodies, density: float, types: int) -> str:
     """The box and the beads at the start in the format of the engine's ``read_data``, for the atom style granular."""
     lines = ["Beads at the start: id, type, diameter (m), density (kg/m^3), centre (m)", ""]
     lines += [f"{len(scene.beads)} atoms", f"{types} atom types", ""]
@@ -383,13 +385,13 @@ def _beads_data(scene: Scene, density: float, types: int) -> str:
     return "\n".join(lines) + "\n"
 
 
-def fastest_of(case: Case, scene: Scene) -> float:
+def fastest_of(case: Case, scene: PlacedBodies) -> float:
     """Ten times the boundary's peak velocity (20 in a pile), plus the speeds of the deepest fall and a bridge, m/s."""
     sizes = sorted(bead.radius for bead in scene.beads)
     mass = bead_volume(sizes[0]) * case.beads.density
     bridge = bridge_at_rest(case, sizes[-1], inf)
     work = abs(bridge.pull) * bridge.rupture  # among loose beads, a bridge may push
-    deep = hop_height(case) if case.boundary.tilt == 0.0 else reach(case)
+    deep = hop_height(case) if case.boundary.tilt == 0.0 else path_length(case)
     fall = sqrt(
         2.0 * case.environment.gravity * (max(scene.upper[2], deep) if case.loose else deep)
     )
@@ -400,7 +402,7 @@ def fastest_of(case: Case, scene: Scene) -> float:
     )
 
 
-def _layout(plan: Plan) -> Layout:
+def _layout(plan: Plan) -> DeckLayout:
     steps = plan.segment.end - plan.segment.begin
     same = (
         "bead_columns",
@@ -410,7 +412,7 @@ def _layout(plan: Plan) -> Layout:
         "walkers",
         "ranks",
     )
-    return Layout(
+    return DeckLayout(
         **{name: getattr(plan, name) for name in same},
         frames=steps // plan.sample_every + 1,
         bridge_frames=steps // plan.bridge_every + 1,

@@ -74,7 +74,7 @@ class PlacedWalker:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Layout:
+class DeckLayout:
     """Dumps of a deck (file names, columns, steps between frames, frames expected) and its walkers."""
 
     bead_dump: str = "beads.bin"

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from walkers.arrays import Vector
-from walkers.inputs.resolving.loads import hop_height, reach
+from walkers.inputs.resolving.loads import hop_height, path_length
 from walkers.inputs.resolving.standing import standing
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import AXES
@@ -45,7 +45,7 @@ Loading = tuple[Vector, ...]
 
 
 @dataclass(frozen=True)
-class Scene:
+class PlacedBodies:
     """Beads, walls and corners of the box, in m; and the different surfaces and loadings."""
 
     beads: tuple[Bead, ...]
@@ -77,13 +77,15 @@ def sharing_key(case: Case) -> Hashable:
     if not case.independent:
         return case
     # Walkers with a spacing below their own reach would meet other neighbours in a shared deck.
-    crowded = case if min(walkers.spacing for walkers in case.walkers) < 2.0 * reach(case) else None
+    crowded = (
+        case if min(walkers.spacing for walkers in case.walkers) < 2.0 * path_length(case) else None
+    )
     # The model of rolling friction is in the deck or not.
     rolling = float(case.contact.rolling_friction > 0.0)
-    contact = case.contact.but(
+    contact = case.contact.with_values(
         friction=None, roughness=None, restitution=0.0, rolling_friction=rolling
     )
-    boundary = case.boundary.but(material="", tilt=0.0, uphill=0.0)
+    boundary = case.boundary.with_values(material="", tilt=0.0, uphill=0.0)
     times: Hashable = (
         *((harmonic.frequency, harmonic.phase) for harmonic in case.excitation.harmonics),
         case.drive.record,
@@ -91,12 +93,12 @@ def sharing_key(case: Case) -> Hashable:
         case.drive.ramp,
     )
     driven = (case.excitation, loading_of(case)) if case.drive.frame == "lab" else times
-    run = tuple(case.run.but(seed=0).determinants().items())
+    run = tuple(case.run.with_values(seed=0).determinants().items())
     return (boundary, contact, driven, run, case.beads.density, crowded)
 
 
 @lru_cache(maxsize=4)  # the segments of a run begin with the same scene
-def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
+def place(cases: tuple[Case, ...]) -> tuple[PlacedBodies, tuple[PlacedWalker, ...]]:
     """Place the bodies of cases that share a deck, and size the box so that no walker can leave it unnoticed.
 
     Each walker draws its start from its own random stream (seed, number of the walker in its case), so that walker k
@@ -123,13 +125,13 @@ def place(cases: tuple[Case, ...]) -> tuple[Scene, tuple[PlacedWalker, ...]]:
         if body.facing:
             walkers.append(PlacedWalker(len(walkers), make, ids, body.facing, body.angle, origin))
     room = _room(cases, grid, spacing)
-    return Scene(tuple(beads), boundary.walls, *room, surfaces, loadings), tuple(walkers)
+    return PlacedBodies(tuple(beads), boundary.walls, *room, surfaces, loadings), tuple(walkers)
 
 
 def _room(
     cases: Sequence[Case], grid: Sequence[tuple[float, float]], spacing: float
 ) -> tuple[Vector, Vector]:
-    far = max(spacing / 2.0, *(reach(case) for case in cases))
+    far = max(spacing / 2.0, *(path_length(case) for case in cases))
     largest = max(max(case.radii) for case in cases)
     amplitude = max(case.excitation.farthest for case in cases)
     placed = [bead.at for case in cases for bead in case.placed]

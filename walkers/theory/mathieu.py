@@ -30,7 +30,7 @@ from walkers.arrays import FloatArray
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.physics.dimer import Dimer
-from walkers.theory.motion import Walker, walk
+from walkers.theory.motion import Walker, predict_motion
 from walkers.theory.quasistatic import (
     inertia_matrix,
     normal_force_matrix,
@@ -124,7 +124,9 @@ def turning_rate(case: Case) -> float | None:
         case.excitation.peak_acceleration,
         case.axial_gravity,
     )
-    motion = walk(walker, frequency, peak, steady_acceleration=steady, steps_per_cycle=_STEPS)
+    motion = predict_motion(
+        walker, frequency, peak, steady_acceleration=steady, steps_per_cycle=_STEPS
+    )
     if not (motion.periodic[0] and motion.solved[0]):
         return None
     # The axial motion in the middle of each step, and the forces that go with it.

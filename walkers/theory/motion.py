@@ -89,7 +89,7 @@ class Walker:
 
 
 @dataclass(frozen=True)
-class Motion:
+class PredictedMotion:
     """Means of N walkers over the last cycle, m/s; over the second half of all cycles if the last two do not agree.
 
     The velocity, positive toward the large bead, is NaN where a contact opened (the model does not hold) and where the
@@ -116,7 +116,7 @@ class Motion:
         return self.smallest_normal_force.min(axis=0) <= 0.0  # type: ignore[no-any-return]
 
 
-def walk(
+def predict_motion(
     walker: Walker,
     frequency: npt.ArrayLike,
     peak_acceleration: npt.ArrayLike,
@@ -125,7 +125,7 @@ def walk(
     cycles: int = CYCLES,
     steps_per_cycle: int = STEPS_PER_CYCLE,
     effect: tuple[Effect, FloatArray] | None = None,
-) -> Motion:
+) -> PredictedMotion:
     """Integrate from rest under the substrate's acceleration a0 cos 2πft and average over the last cycle.
 
     There are N walkers, or one for all drives; f (Hz), a0 and a steady pull along the axis toward the small bead (m/s²:
@@ -153,7 +153,7 @@ def walk(
     if not np.any(drive[:, 2]):  # by symmetry; the rest is the error of the steps
         velocity = np.where(walker.sin_delta == 0.0, 0.0, velocity)
     holds = solved & (least > 0.0).all(axis=0)
-    return Motion(
+    return PredictedMotion(
         velocity=np.where(holds, velocity, np.nan),
         rotation=velocity - mean[:2],
         sliding=mean,

@@ -15,11 +15,11 @@ from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.measure.gait import GROWS
-from walkers.postprocess.measure.results import plain
+from walkers.postprocess.measure.results import json_numbers
 from walkers.rounding import with_decimals
 from walkers.text import aligned
 from walkers.theory.mathieu import LARGEST_STABLE_V, alignment, time_to_turn, turning_rate
-from walkers.theory.motion import Motion, Walker, walk
+from walkers.theory.motion import PredictedMotion, Walker, predict_motion
 from walkers.theory.quasistatic import CONTACTS, FRICTION_OF_THE_PAPER, detachment, mean_velocity
 
 MOVING = 1e-6
@@ -38,13 +38,13 @@ _FREQUENCIES, _LARGEST_PEAK, _LARGEST_GAMMA0 = (60.0, 90.0), 10.0, 3.5
 """Their drives: Hz, g of 9.8 m/s² (both Fig. 2), and Γ0 (Fig. 4b)."""
 
 
-def motion_of(*cases: Case) -> Motion:
+def motion_of(*cases: Case) -> PredictedMotion:
     """The motions of the walkers of cases, aligned with the drive, with the same bridges as in the engine.
 
     Errors as for `check_applies`.
     """
     check_applies(*cases)
-    return walk(
+    return predict_motion(
         Walker.joined([Walker.of_case(case) for case in cases]),
         [case.excitation.frequency for case in cases],
         [case.excitation.peak_acceleration for case in cases],
@@ -100,7 +100,7 @@ def threshold(case: Case) -> float:
 
 
 def _smallest_gamma(
-    case: Case, most: float, happens: Callable[[Motion], npt.NDArray[np.bool_]]
+    case: Case, most: float, happens: Callable[[PredictedMotion], npt.NDArray[np.bool_]]
 ) -> tuple[float, str | None]:
     """The smallest Γ0 up to ``most`` at which something happens to the walker of a case, NaN if it does not happen.
 
@@ -111,7 +111,9 @@ def _smallest_gamma(
         trials = np.linspace(low, high, _TRIALS)
         accelerations = np.array([dimer.peak_acceleration(float(gamma)) for gamma in trials])
         pull = case.axial_gravity
-        motion = walk(walker, case.excitation.frequency, accelerations, steady_acceleration=pull)
+        motion = predict_motion(
+            walker, case.excitation.frequency, accelerations, steady_acceleration=pull
+        )
         happened = happens(motion)
         if not happened.any():
             return nan, None
@@ -151,8 +153,10 @@ def predict(case: Case) -> dict[str, Any]:
     return {
         "gamma0": gamma0,
         "sin_delta": dimer.sin_delta,
-        "paper": plain({"friction": FRICTION_OF_THE_PAPER, "velocity": linear, "reason": reason}),
-        "viscous": plain(
+        "paper": json_numbers(
+            {"friction": FRICTION_OF_THE_PAPER, "velocity": linear, "reason": reason}
+        ),
+        "viscous": json_numbers(
             {
                 "velocity": float(motion.velocity[0]) if motion.periodic[0] else nan,
                 "rotation": motion.rotation[:, 0].tolist(),
@@ -211,7 +215,7 @@ def outside_of_the_paper(case: Case) -> str | None:
     )
 
 
-def _why_unknown(motion: Motion, of: int) -> str | None:
+def _why_unknown(motion: PredictedMotion, of: int) -> str | None:
     """Reason why a motion has no velocity; None if it has."""
     if not motion.solved[of]:
         return "the forces have no solution"
@@ -247,7 +251,7 @@ def alignment_of(case: Case) -> dict[str, Any]:
     }
 
 
-def describe(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> str:
+def prediction_text(prediction: dict[str, Any], result: Mapping[str, Any] | None) -> str:
     """A prediction as a table, with the result of the engine if it exists; on a slope of the walkers that face up."""
     paper, end, state = (prediction[name] for name in ("paper", "detachment", "alignment"))
     models = {

@@ -44,7 +44,7 @@ def integrate(
     cycles: int,
     steps: int,
 ) -> tuple[FloatArray, FloatArray, BoolArray, BoolArray, FloatArray]:
-    """Walk N walkers from rest; see `walkers.theory.motion.walk`.
+    """Walk N walkers from rest; see `walkers.theory.motion.predict_motion`.
 
     ``tables`` (N, 3, 13, 3) have for stages (of h seconds) of a step, of an 8th and of a 64th of it: velocities v0
     become P v0 - h G F∥, normal forces are F0 + B P v0 + D F∥; three rows of P, G (m/s²), D and B (s/m), and F0.

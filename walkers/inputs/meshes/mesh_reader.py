@@ -265,7 +265,7 @@ def _read_by_meshio(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     return points, _triangles_of_polygons(points, polygons)
 
 
-def read(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+def read_surface(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     """The surface of a mesh file.
 
     Parameters
@@ -314,7 +314,7 @@ def main(arguments: Sequence[str]) -> int:
     _limit(resource.RLIMIT_CPU, MOST_SECONDS)
     _limit(resource.RLIMIT_CORE, 0)
     try:
-        points, triangles = read(Path(arguments[0]))
+        points, triangles = read_surface(Path(arguments[0]))
     except MemoryError:
         sys.stdout.write(f"it takes more than {MOST_BYTES >> 30} GB to read")
         return REFUSED

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from walkers.arrays import FloatArray, IntArray
-from walkers.errors import InputError, unusable
+from walkers.errors import InputError, key_error
 from walkers.inputs.meshes.crossings import first_crossing, first_fold
 from walkers.inputs.meshes.triangles import SAME_POINT, merged
 from walkers.inputs.meshes.vessel import Vessel
@@ -80,7 +80,7 @@ def _vessel_of(point_bytes: bytes, triangle_bytes: bytes, scale: float) -> Vesse
 
 def _broken(problem: str, point: FloatArray, expected: str) -> InputError:
     place = ", ".join(f"{1e3 * x + 0.0:.4g}" for x in point)
-    return unusable("boundary.mesh", f"{problem} at ({place}) mm; expected {expected}")
+    return key_error("boundary.mesh", f"{problem} at ({place}) mm; expected {expected}")
 
 
 def _restricted(vessel: Vessel, triangles: IntArray) -> Vessel:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.arrays import FloatArray, IntArray
-from walkers.errors import unusable
+from walkers.errors import key_error
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -43,7 +43,7 @@ def merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArra
     _, once = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     triangles = triangles[[number for number in sorted(once) if wide[number]]]
     if not len(triangles):
-        raise unusable(
+        raise key_error(
             "boundary.mesh", "has no triangles of any size; expected the inner surface of a vessel"
         )
     used, renumbered = np.unique(triangles, return_inverse=True)

@@ -30,7 +30,7 @@ from walkers.inputs.meshes.triangles import (
     signed_distance,
     within_polygon,
 )
-from walkers.inputs.meshes.wall_names import names_of_faces, numbered, span_text
+from walkers.inputs.meshes.wall_names import names_of_faces, numbered_names, span_text
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -234,7 +234,7 @@ class Vessel:
     def _edges(self) -> Iterator[Facet]:
         standing = self._standing_edges()
         ends = [self.points[[*self.ends(*shared[0])]] for shared in standing]
-        names = numbered([f"edge {span_text(points[:, 2].tolist())}" for points in ends])
+        names = numbered_names([f"edge {span_text(points[:, 2].tolist())}" for points in ends])
         for shared, (first, last), name in zip(standing, ends, names, strict=True):
             halves = [(first, last - first), (last, first - last)]
             halves += [(self.points[self.ends(*at)[0]], -self._inwards[at]) for at in shared]
@@ -253,7 +253,7 @@ class Vessel:
         corners = sorted(
             {point for shared in self._standing_edges() for point in self.ends(*shared[0])}
         )
-        names = numbered(
+        names = numbered_names(
             [f"corner {span_text([float(self.points[corner, 2])])}" for corner in corners]
         )
         for corner, name in zip(corners, names, strict=True):

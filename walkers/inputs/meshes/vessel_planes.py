@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from walkers.arrays import Vector
-from walkers.errors import unusable
+from walkers.errors import key_error
 from walkers.inputs.meshes.triangles import merged
 from walkers.inputs.meshes.vessel import Vessel
 
@@ -28,7 +28,7 @@ def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Ve
     )  # the largest one between them is in the middle
     best = linprog([0, 0, 0, -1], spheres, -offsets, bounds=[(None, None)] * 3 + [(0, None)])
     if best.status or best.x[3] < 1e-9:
-        raise unusable(
+        raise key_error(
             "boundary.planes",
             "enclose nothing; expected normals toward the beads, and a height above them",
         )
@@ -37,7 +37,7 @@ def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Ve
     if np.abs(corners).max() > 0.999 * far:
         out = corners[np.abs(corners).max(axis=1).argmax()]
         side = f"{'-+'[int(out[abs(out).argmax()] > 0.0)]}{'xyz'[int(abs(out).argmax())]}"
-        raise unusable(
+        raise key_error(
             "boundary.planes", f"are open toward {side}; expected planes that close the vessel"
         )
     triangles: list[list[int]] = []
@@ -46,7 +46,7 @@ def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Ve
             [place for place, meeting in enumerate(room.dual_facets) if number in meeting]
         )
         if len(held) < 3:
-            raise unusable(
+            raise key_error(
                 f"boundary.planes[{number}]",
                 "is behind the others; expected planes that beads can touch",
             )

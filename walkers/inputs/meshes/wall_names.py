@@ -42,7 +42,7 @@ def names_of_faces(
         for number, (low, high) in enumerate(heights):
             if times[names[number]] > 1:
                 names[number] += f" {span_text([low, high])}"
-    return numbered(names)
+    return numbered_names(names)
 
 
 def _side(normal: Vector) -> str:
@@ -64,12 +64,12 @@ def span_text(heights: Sequence[float]) -> str:
     return f"{low} mm" if low == high else f"{low}–{high} mm"
 
 
-def numbered(names: Sequence[str]) -> list[str]:
+def numbered_names(names: Sequence[str]) -> list[str]:
     """The names, those that are given several times with numbers."""
     times = Counter(names)
     used: Counter[str] = Counter()
-    numbered = []
+    numbered_names = []
     for name in names:
         used[name] += 1
-        numbered.append(f"{name} no. {used[name]}" if times[name] > 1 else name)
-    return numbered
+        numbered_names.append(f"{name} no. {used[name]}" if times[name] > 1 else name)
+    return numbered_names

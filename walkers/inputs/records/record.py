@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 
 from walkers.arrays import FloatArray
-from walkers.inputs.config_table import SAME_RUN, Table
+from walkers.inputs.config_table import SAME_RUN, ConfigTable
 from walkers.inputs.records.signals import (
     ComplexArray,
     hann_mean,
@@ -72,7 +72,7 @@ _DISPLACEMENTS = (
 )  # smallest and largest amplitude of an electrodynamic shaker, with a margin, m
 
 
-class Record(Table):
+class Record(ConfigTable):
     """The rows of a file: time (s), acceleration along x, y and z (m/s²).
 
     ``repeats`` says whether they are a period, which repeats. ``ignored_columns`` are the names of

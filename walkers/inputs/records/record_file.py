@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TypedDict
 
 from walkers.files import read_limited
-from walkers.inputs.units import ACCELERATION, TIME, Kind, parse_quantity
+from walkers.inputs.units import ACCELERATION, TIME, QuantityKind, parse_quantity
 
 _MOST_BYTES = 64 << 20
 _EXAMPLE = '"time (ms), x (g), z (m/s^2)"'
@@ -198,7 +198,7 @@ def _place_of(name: str) -> int | None:
     return 1 + "xyz".index(match["axis"] or match["first"])
 
 
-def _factor_of(head: str, unit: str, kind: Kind) -> float:
+def _factor_of(head: str, unit: str, kind: QuantityKind) -> float:
     """A unit in SI units."""
     if kind is ACCELERATION:
         if unit in _METRE_PER_SECOND_SQUARED:

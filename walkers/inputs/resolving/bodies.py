@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import dist
 from typing import NamedTuple
 
-from walkers.errors import expected_of, unusable
+from walkers.errors import expected_of, key_error
 from walkers.inputs.config_table import present
 from walkers.inputs.resolving.length import cycles_of, samples_of
 from walkers.inputs.resolving.loads import contact_loads, room_of_paths
@@ -118,9 +118,9 @@ def mixture_of(draft: MixtureDraft, boundary: Boundary, notes: Notes) -> Mixture
     """
     table = draft.table
     if max(draft.small_radii) >= min(draft.large_radii):
-        raise unusable("mixture.large", "expected radii above those of the small beads")
+        raise key_error("mixture.large", "expected radii above those of the small beads")
     if not boundary.closed:
-        raise unusable(
+        raise key_error(
             "boundary.shape", 'expected a container, such as "box": a mixture is poured into it'
         )
     count = table.count
@@ -129,7 +129,7 @@ def mixture_of(draft: MixtureDraft, boundary: Boundary, notes: Notes) -> Mixture
         _, volume_of_bead = share_and_volume(table, draft.small_radii, draft.large_radii)
         count = round(_PACKING * bed / volume_of_bead)
         if not 1 <= count <= MOST_BEADS:
-            raise unusable(
+            raise key_error(
                 "mixture.fill_height", f"that takes {count} beads; expected 1 to {MOST_BEADS}"
             )
         notes.add("mixture.count", "from the fill_height")
@@ -164,7 +164,7 @@ def facing_of(draft: WalkerDraft, key: str, boundary: Boundary) -> str:
     if facing in _FACING:
         if not boundary.tilt or boundary.uphill:
             message = "on a plane that is tilted along the drive alone walkers face up or down"
-            raise unusable(f"{key}.facing", f'expected "both", "right" or "left": {message}')
+            raise key_error(f"{key}.facing", f'expected "both", "right" or "left": {message}')
         facing = _FACING[facing]
     if isinstance(draft.table, ClusterTable):
         if draft.geometry.at:
@@ -177,19 +177,19 @@ def facing_of(draft: WalkerDraft, key: str, boundary: Boundary) -> str:
 def _check_arrangement(cluster: WalkerGeometry, key: str) -> None:
     name, arrangement = cluster.arrangement, ARRANGEMENTS.get(cluster.arrangement)
     if arrangement is None:
-        raise unusable(f"{key}.arrangement", expected_of(name, ARRANGEMENTS))
+        raise key_error(f"{key}.arrangement", expected_of(name, ARRANGEMENTS))
     key = f"{key}.radii"
     if not arrangement.fewest <= len(cluster.radii) <= arrangement.most:
         least = f"at least {arrangement.fewest}"
         bound = least if arrangement.fewest < arrangement.most else str(arrangement.most)
-        raise unusable(key, f"expected {bound} beads in a {name}")
+        raise key_error(key, f"expected {bound} beads in a {name}")
     try:
         overlapping = touching(cluster.design, cluster.radii, -OVERLAP)
     except ValueError as error:
-        raise unusable(key, str(error)) from error
+        raise key_error(key, str(error)) from error
     if overlapping:
         first, second = (bead + 1 for bead in overlapping[0])
-        raise unusable(
+        raise key_error(
             key, f"beads {first} and {second} would overlap in a {name}; expected similar radii"
         )
 
@@ -198,18 +198,18 @@ def _check_places(cluster: WalkerGeometry, key: str) -> None:
     """Beads that are given places touch, do not overlap, and have a heading."""
     everyone, places = set(range(len(cluster.radii))), cluster.at
     if len(places) != len(everyone):
-        raise unusable(key, f"expected a place for each of the {len(everyone)} beads")
+        raise key_error(key, f"expected a place for each of the {len(everyone)} beads")
     if overlapping := touching(places, cluster.radii, -OVERLAP):
         first, second = overlapping[0]
         distances = dist(places[first], places[second]), cluster.rigid(first, second)
-        raise unusable(f"{key}[{second}]", overlaps(f"{key}[{first}]", *distances))
+        raise key_error(f"{key}[{second}]", overlaps(f"{key}[{first}]", *distances))
     if not any(cluster.front):
-        raise unusable(key, "expected some beads ahead of others: this walker has no heading")
+        raise key_error(key, "expected some beads ahead of others: this walker has no heading")
     joined = {0}
     for _ in everyone:
         joined |= {bead for pair in cluster.pairs if joined & {*pair} for bead in pair}
     if alone := everyone - joined:
-        raise unusable(
+        raise key_error(
             f"{key}[{min(alone)}]",
             "expected beads that touch: this bead is not connected to the first",
         )
@@ -238,7 +238,7 @@ def check_walkers_at_rest(case: Case, file: CaseFile, notes: Notes) -> None:
         overlap = max(load.overlap for load in contact_loads(case, walkers))
         if overlap * (1.0 + walkers.gap_spread) > 0.02 * min(walkers.radii):
             message = "expected a larger one: at rest the beads overlap by more than 2 % of the smallest radius"
-            raise unusable("contact.youngs_modulus", message)
+            raise key_error("contact.youngs_modulus", message)
         if given[key] is None:
             avoided = "touch at the start" if walkers.meet else "meet"
             notes.add(f"{key}.spacing", f"so that walkers do not {avoided}")
@@ -247,7 +247,7 @@ def check_walkers_at_rest(case: Case, file: CaseFile, notes: Notes) -> None:
         least = (1.0 if walkers.meet else 1.5) * walkers.length
         if walkers.spacing < least and sum(make.replicates for make in case.walkers) > 1:
             message = f'neighbouring walkers would touch or overlap; expected at least {1e3 * least:.3g} mm, or "auto"'
-            raise unusable(f"{key}.spacing", message)
+            raise key_error(f"{key}.spacing", message)
 
 
 def _check_held(case: Case, walkers: Walkers) -> None:
@@ -263,4 +263,4 @@ def _check_held(case: Case, walkers: Walkers) -> None:
                 else ("law", "a law that pulls")
             )
             pushed = f"at rest, the bridge pushes {name} apart ({-1e6 * load.pull:.3g} uN)"
-            raise unusable(f"liquid.{key}", f"expected {remedy}: {pushed}")
+            raise key_error(f"liquid.{key}", f"expected {remedy}: {pushed}")

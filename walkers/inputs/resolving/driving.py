@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import dist
 from typing import Any
 
-from walkers.errors import unusable
+from walkers.errors import key_error
 from walkers.inputs.config_table import present
 from walkers.inputs.resolving.notes import Notes
 from walkers.inputs.tables.boundary import Boundary
@@ -45,7 +45,7 @@ def drive_of(table: DriveTable, boundary: Boundary, dimer: Dimer | None, notes: 
     if table.record:
         return _recorded_drive(table, notes)
     if table.repeats:
-        raise unusable("drive.repeats", "expected none without drive.record")
+        raise key_error("drive.repeats", "expected none without drive.record")
     if table.harmonics:
         harmonics: list[Harmonic] = []
         for number, harmonic in enumerate(table.harmonics):
@@ -73,7 +73,7 @@ def _axis_and_peak(
         notes.add(f"{key}.axis", f"of a {boundary.shape}", "default")
     if sine.gamma0 is not None:
         if dimer is None:
-            raise unusable(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")
+            raise key_error(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")
         peak = dimer.peak_acceleration(sine.gamma0)
         notes.add(f"{key}.peak_acceleration", "from gamma0, the dimer and the liquid")
     return {"axis": axis, "peak_acceleration": peak}
@@ -85,12 +85,12 @@ def _check_harmonics(drive: Drive) -> None:
     try:
         common_frequency([harmonic.frequency for harmonic in excitation.harmonics])
     except ValueError as error:
-        raise unusable(
+        raise key_error(
             "drive.harmonics", f"expected frequencies with a common period: {error}"
         ) from error
     if drive.frame == "lab" and not excitation.is_plain:
         message = "several harmonics, or one with a phase, are driven in the container's frame"
-        raise unusable("drive.frame", f'expected "container": {message}')
+        raise key_error("drive.frame", f'expected "container": {message}')
 
 
 def _recorded_drive(table: DriveTable, notes: Notes) -> Drive:
@@ -100,7 +100,7 @@ def _recorded_drive(table: DriveTable, notes: Notes) -> Drive:
     record = present(excitation.record, "drive.record")
     first, last = (record.rows[end][1:] for end in (0, -1))
     if record.repeats and dist(first, last) > _MEET * record.largest(2):
-        raise unusable(
+        raise key_error(
             "drive.repeats", "expected a record that ends with the first row of the next period"
         )
     check_drive(excitation)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from walkers.errors import Problem, expected_of, shown
+from walkers.errors import Problem, expected_of, quoted
 from walkers.inputs.config_table import alternatives, changed
 from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.origins import Source
@@ -72,7 +72,7 @@ def _unknown(library: Library, given: set[str], names: Sequence[str | None]) -> 
             expected = (
                 f"nor in a library.toml beside the case; {expected_of(name, library.names(kind))}"
             )
-            problems.append(Problem(key, shown(name), f"not in the library, {expected}"))
+            problems.append(Problem(key, quoted(name), f"not in the library, {expected}"))
     return problems
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from math import ceil, floor, inf
 
-from walkers.errors import unusable
+from walkers.errors import key_error
 from walkers.inputs import units
 from walkers.inputs.origins import Source
 from walkers.inputs.tables.case import Setup
 from walkers.inputs.tables.drive import Excitation
-from walkers.inputs.tables.run import CONSTANT, Run, RunTable, settling_of
+from walkers.inputs.tables.run import CONSTANT, RunSettings, RunTable, settling_of
 from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
 from walkers.rounding import percent
 
@@ -42,7 +42,7 @@ def limits_of(case: Setup) -> TimeStepLimits:
     )
 
 
-def run_of(case: Setup) -> tuple[Run, dict[str, Source]]:
+def resolved_run(case: Setup) -> tuple[RunSettings, dict[str, Source]]:
     """The time step, the length and the sampling of the run of a case.
 
     Parameters
@@ -77,7 +77,7 @@ def run_of(case: Setup) -> tuple[Run, dict[str, Source]]:
     if rest is None and case.loose:
         rest = _LONGEST_SETTLING
     run = table.completed(
-        Run,
+        RunSettings,
         {
             "time_step": time_step,
             "steps_per_cycle": steps,
@@ -98,7 +98,7 @@ def run_of(case: Setup) -> tuple[Run, dict[str, Source]]:
         if most < 1:
             longest = MOST_STEPS * time_step - _SETTLING_MARGIN
             message = f"expected less than {longest:.3g} s: the engine counts steps up to 2^31"
-            raise unusable("run.longest_settling", message)
+            raise key_error("run.longest_settling", message)
     _check_length(case, run, most)
     return run, _sources(run, case, reason)
 
@@ -114,7 +114,7 @@ def _largest_step(case: Setup) -> tuple[float, str]:
     if exceeded and not table.allow_unstable:
         allowed = f"{min(vars(limits).values()) * 1e6:.3g} us"
         message = f"beyond the {' and the '.join(exceeded)} limit; expected less than {allowed}, "
-        raise unusable("run.time_step", f'{message}"auto", or allow_unstable = true')
+        raise key_error("run.time_step", f'{message}"auto", or allow_unstable = true')
     return largest, reason
 
 
@@ -149,7 +149,7 @@ def cycles_of(table: RunTable, drive: Excitation, cycles_per_sample: int) -> int
     return ceil((needed or _MOST_CYCLES) / cycles_per_sample) * cycles_per_sample
 
 
-def _sources(run: Run, case: Setup, reason: str) -> dict[str, Source]:
+def _sources(run: RunSettings, case: Setup, reason: str) -> dict[str, Source]:
     """Sources of the values of a run that its table does not give."""
     cycles_from, cycles, settling = (
         "from the duration" if run.duration else "not checked earlier",
@@ -186,7 +186,7 @@ def _sources(run: Run, case: Setup, reason: str) -> dict[str, Source]:
     return sources
 
 
-def _check_length(case: Setup, run: Run, longest: float) -> None:
+def _check_length(case: Setup, run: RunSettings, longest: float) -> None:
     """Refuse a run that is too short or too long for what is measured, for its drive, or for the engine (cycles)."""
     drive, cycles, settling, every = (
         case.excitation,
@@ -196,40 +196,40 @@ def _check_length(case: Setup, run: Run, longest: float) -> None:
     )
     (fewest, most), name = drive.cycles, "run.cycles" if run.duration is None else "run.duration"
     if run.until and case.mixture is None:
-        raise unusable(
+        raise key_error(
             "run.until", "expected none: only clusters of a [mixture] climb out of a pile"
         )
     if cycles < 2:
-        raise unusable(
+        raise key_error(
             name, f"expected at least two cycles of the drive, {2.0 / drive.frequency:.4g} s"
         )
     if cycles - settling < 2:
-        raise unusable("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
+        raise key_error("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
     if case.walkers and cycles // every <= run.settled_strobes:
         message = f"expected more: one frame in {every} cycles leaves none after {settling} settling cycles"
-        raise unusable("run.frames_per_second", message)
+        raise key_error("run.frames_per_second", message)
     if (
         drive.record
         and (apart := drive.record.length / (len(drive.record.rows) - 1)) < run.time_step
     ):
         rows = f"its rows, {1e6 * apart:.3g} us apart, are closer than the time step, {1e6 * run.time_step:.3g} us"
-        raise unusable(
+        raise key_error(
             "drive.record",
             f"{rows}; expected fewer rows, or a shorter run.time_step",
             drive.record.file,
         )
     if cycles < fewest:
-        raise unusable(
+        raise key_error(
             name, f"expected at least {ceil(fewest)} cycles, {drive.ramp[-1][0]:g} s, of drive.ramp"
         )
     if cycles > most + 1e-9:
         message = (
             "drive.record has no more; drive.repeats = true repeats one that ends as it begins"
         )
-        raise unusable(name, f"expected at most {int(most)} cycles: {message}")
+        raise key_error(name, f"expected at most {int(most)} cycles: {message}")
     if cycles > longest:
         limit = f"{longest}" if run.duration is None else f"{longest // drive.frequency:g} s"
-        raise unusable(name, f"expected at most {limit}: the engine counts steps up to 2^31")
+        raise key_error(name, f"expected at most {limit}: the engine counts steps up to 2^31")
 
 
 def samples_of(table: RunTable, drive: Excitation, *, loose: bool) -> tuple[int, int]:
@@ -248,9 +248,9 @@ def _samples_per_bridge_sample(case: Setup, samples: int) -> int:
     if bridges is None:
         return 1 if case.loose else samples
     if case.loose:
-        raise unusable(name, "expected none: bridges of loose beads are in every frame")
+        raise key_error(name, "expected none: bridges of loose beads are in every frame")
     if samples % bridges:
-        raise unusable(name, f"expected a divisor of samples_per_cycle = {samples}")
+        raise key_error(name, f"expected a divisor of samples_per_cycle = {samples}")
     return samples // bridges
 
 
@@ -268,16 +268,16 @@ def _until_steady(case: Setup, cycles_per_sample: int) -> bool:
         message = (
             f"expected none: with run.{until[0]}, walkers run until their velocity is constant"
         )
-        raise unusable(f"run.{given[0]}", message)
+        raise key_error(f"run.{given[0]}", message)
     if until and not case.apart:
-        raise unusable(
+        raise key_error(
             f"run.{until[0]}", "expected run.duration: a run until steady needs independent walkers"
         )
     if until and case.excitation.changes:
         changing = (
             "with drive.ramp" if case.drive.ramp else "with the changing amplitude of drive.record"
         )
-        raise unusable(
+        raise key_error(
             f"run.{until[0]}", f"expected a number of cycles: {changing} no velocity is constant"
         )
     if case.excitation.ends and not until:

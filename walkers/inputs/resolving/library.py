@@ -11,7 +11,7 @@ from math import sqrt
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from walkers.errors import InputError, Problem, expected_of, refused, shown
+from walkers.errors import InputError, Problem, expected_of, input_error, quoted
 from walkers.inputs.messages import validated
 from walkers.inputs.origins import Whence
 from walkers.inputs.toml import read_toml
@@ -143,7 +143,9 @@ def check_library(tables: object, source: str) -> None:
     from walkers.inputs.resolving.library_file import LibraryFile
 
     if not isinstance(tables, Mapping):
-        raise refused(source, "expected the tables of a library: materials, liquids, surface_pairs")
+        raise input_error(
+            source, "expected the tables of a library: materials, liquids, surface_pairs"
+        )
     validated(LibraryFile, tables, source, "a library")
     shipped, text = _contents(), "is in the library of the program; expected "
     kinds = ("materials", "liquids")
@@ -166,7 +168,7 @@ def check_library(tables: object, source: str) -> None:
         given.append(pair)
         for name in sorted({*names}.difference(materials)):
             why = f"not in the library; {expected_of(name, materials)}"
-            problems.append(Problem(f"{key}.materials", shown(name), why))
+            problems.append(Problem(f"{key}.materials", quoted(name), why))
     if problems:
         raise InputError(source, problems)
 

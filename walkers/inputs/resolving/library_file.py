@@ -7,7 +7,7 @@ from typing import Annotated, Any, Generic, TypeVar
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from walkers.inputs import units
-from walkers.inputs.config_table import Table
+from walkers.inputs.config_table import ConfigTable
 from walkers.inputs.units import Coefficient, Number
 
 Q = TypeVar("Q")
@@ -23,7 +23,7 @@ Text = Annotated[str, AfterValidator(_printable)]
 """A name or a source, which commands and reports print as it is."""
 
 
-class Sourced(Table, Generic[Q]):
+class Sourced(ConfigTable, Generic[Q]):
     """``{ value = …, source = "…" }``: a number of a library, and both ends of where it can lie if it is uncertain."""
 
     value: Q
@@ -42,7 +42,7 @@ class Sourced(Table, Generic[Q]):
         return ends
 
 
-class MaterialTable(Table):
+class MaterialTable(ConfigTable):
     """``[materials."NAME"]``; the modulus of contacts is not this one but the case's ``contact.youngs_modulus``."""
 
     density: Sourced[units.Density]
@@ -51,7 +51,7 @@ class MaterialTable(Table):
     roughness: Sourced[units.Length] | None = None
 
 
-class LiquidTable(Table):
+class LibraryLiquidTable(ConfigTable):
     """``[liquids."NAME"]``, with one of the two viscosities."""
 
     surface_tension: Sourced[units.SurfaceTension]
@@ -60,13 +60,13 @@ class LiquidTable(Table):
     dynamic_viscosity: Sourced[units.DynamicViscosity] | None = None
 
     @model_validator(mode="after")
-    def _has_a_viscosity(self) -> LiquidTable:
+    def _has_a_viscosity(self) -> LibraryLiquidTable:
         if (self.kinematic_viscosity is None) == (self.dynamic_viscosity is None):
             raise ValueError("expected either kinematic_viscosity or dynamic_viscosity")
         return self
 
 
-class SurfacePairTable(Table):
+class SurfacePairTable(ConfigTable):
     """``[[surface_pairs]]``: how wet surfaces of two materials touch."""
 
     materials: tuple[Text, Text]
@@ -78,9 +78,9 @@ class SurfacePairTable(Table):
     contact_angle: Sourced[units.UpToRightAngle] | None = None
 
 
-class LibraryFile(Table):
+class LibraryFile(ConfigTable):
     """A library: materials, liquids and surface pairs, each number with its source."""
 
     materials: dict[Text, MaterialTable] = Field(default={})
-    liquids: dict[Text, LiquidTable] = Field(default={})
+    liquids: dict[Text, LibraryLiquidTable] = Field(default={})
     surface_pairs: list[SurfacePairTable] = Field(default=[])

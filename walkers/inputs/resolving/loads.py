@@ -185,7 +185,7 @@ def contact_loads(case: Setup, walkers: Walkers | None = None) -> list[Load]:
     return loads
 
 
-def reach(case: Case) -> float:
+def path_length(case: Case) -> float:
     """Room around the start of a walker, m (`room_of_paths`)."""
     longest = max((walkers.length for walkers in case.walkers), default=0.0)
     return room_of_paths(case.excitation.peak_velocity, case.duration, longest)
@@ -212,7 +212,8 @@ def room_of_paths(peak_velocity: float, duration: float, longest: float) -> floa
 def hop_height(case: Case) -> float:
     """Height that a bead thrown up at twice the substrate's peak velocity reaches, m (its reach without gravity)."""
     if case.pressing_gravity <= 0.0:
-        return reach(case)
+        return path_length(case)
     return min(
-        (2.0 * case.excitation.peak_velocity) ** 2 / (2.0 * case.pressing_gravity), reach(case)
+        (2.0 * case.excitation.peak_velocity) ** 2 / (2.0 * case.pressing_gravity),
+        path_length(case),
     )

@@ -7,7 +7,7 @@ from itertools import combinations
 from math import acos, degrees
 from typing import Any
 
-from walkers.errors import unusable
+from walkers.errors import key_error
 from walkers.inputs.config_table import present
 from walkers.inputs.meshes.mesh_surface import vessel_of
 from walkers.inputs.meshes.vessel import SHARP, Vessel
@@ -55,7 +55,7 @@ def with_vessel(
     if boundary.mesh is not None:
         why = "of the mesh"
         boundary, vessel = _of_mesh(boundary, boundary.mesh, document)
-        boundary = boundary.but(height=vessel.height)
+        boundary = boundary.with_values(height=vessel.height)
         notes.add("boundary.height", why)
     else:
         why = "of the planes"
@@ -67,10 +67,10 @@ def with_vessel(
             for length in (width, size)
         )
         message = f"the vessel is {wide} wide and the beads {across}; expected 1 to {_WIDEST:g} beads across"
-        raise unusable("boundary.scale" if boundary.mesh else "boundary.planes", message)
+        raise key_error("boundary.scale" if boundary.mesh else "boundary.planes", message)
     notes.add("boundary.width", why)
     notes.add("boundary.shape", why)
-    return boundary.but(width=width, shape="vessel")
+    return boundary.with_values(width=width, shape="vessel")
 
 
 def _of_mesh(boundary: Boundary, mesh: str, document: Mapping[str, Any]) -> tuple[Boundary, Vessel]:
@@ -78,26 +78,26 @@ def _of_mesh(boundary: Boundary, mesh: str, document: Mapping[str, Any]) -> tupl
     try:
         vessel = vessel_of(document["meshes"][mesh], present(boundary.scale, "boundary.scale"))
     except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise unusable("meshes", f"expected points and triangles of {mesh}") from error
+        raise key_error("meshes", f"expected points and triangles of {mesh}") from error
     planes = tuple(Plane(point=point, normal=normal) for point, normal in vessel.planes())
     if planes:
-        return boundary.but(planes=planes), vessel
+        return boundary.with_values(planes=planes), vessel
     points = tuple(map(tuple, vessel.points.tolist()))
     triangles = tuple(map(tuple, vessel.triangles.tolist()))
-    return boundary.but(points=points, triangles=triangles), vessel
+    return boundary.with_values(points=points, triangles=triangles), vessel
 
 
 def _of_planes(boundary: Boundary) -> tuple[Boundary, Vessel]:
     """The boundary with planes in order, and the surface between them."""
-    boundary = boundary.but(planes=_planes(boundary.planes))
-    vessel = boundary.but(shape="vessel").vessel
+    boundary = boundary.with_values(planes=_planes(boundary.planes))
+    vessel = boundary.with_values(shape="vessel").vessel
     if abs(lowest := float(vessel.points[:, 2].min())) > 1e-9:
-        raise unusable(
+        raise key_error(
             "boundary.planes",
             f"have their lowest point at z = {1e3 * lowest:.4g} mm; expected 0 mm",
         )
     if (top := vessel.height) < (1.0 - 1e-9) * present(boundary.height, "boundary.height"):
-        raise unusable(
+        raise key_error(
             "boundary.height", f"the planes close the vessel; expected at most {1e3 * top:.4g} mm"
         )
     return boundary, vessel
@@ -108,9 +108,9 @@ def _planes(planes: Sequence[Plane]) -> tuple[Plane, ...]:
     units = []
     for number, plane in enumerate(planes):
         try:
-            units.append(plane.but(normal=unit_vector(plane.normal)))
+            units.append(plane.with_values(normal=unit_vector(plane.normal)))
         except ValueError as error:
-            raise unusable(
+            raise key_error(
                 f"boundary.planes[{number}].normal", "expected a direction such as [0, 0, 1]"
             ) from error
     for (number, first), (index, second) in combinations(enumerate(units), 2):
@@ -121,7 +121,7 @@ def _planes(planes: Sequence[Plane]) -> tuple[Plane, ...]:
         )
         if turn < SHARP:
             message = f"turns by {degrees(turn):.3g} deg from planes[{number}]; expected 45 deg or more, or a mesh"
-            raise unusable(f"boundary.planes[{index}].normal", message)
+            raise key_error(f"boundary.planes[{index}].normal", message)
     return tuple(
         sorted(units, key=lambda plane: plane.normal != BOTTOM.normal or plane.point[2] != 0.0)
     )

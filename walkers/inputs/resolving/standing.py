@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.random import default_rng
 
-from walkers.errors import unusable
+from walkers.errors import key_error
 from walkers.inputs.resolving.loads import contact_loads
 from walkers.inputs.tables.bodies import Mixture, Walkers
 from walkers.inputs.tables.case import Case
@@ -50,7 +50,7 @@ def standing(case: Case) -> Iterator[tuple[int, Standing]]:
             try:
                 yield from ((number, walker) for walker in _walkers(case, body, first))
             except ValueError as error:  # in a groove
-                raise unusable(f"{keys[number]}.radii", str(error)) from error
+                raise key_error(f"{keys[number]}.radii", str(error)) from error
             first += body.replicates
         else:
             yield number, _poured(case, body)
@@ -109,9 +109,10 @@ def _poured(case: Case, mixture: Mixture) -> Standing:
         for layer in case.boundary.geometry.layers(largest, floor)
         for x, y in layer.places
     )
+    radii = [float(size) for size in draw.permutation(mixture.all_radii)]
     for radius, (layer, x, y) in zip(
-        (float(size) for size in draw.permutation(mixture.all_radii)), places
-    ):  # noqa: B905
+        radii, places, strict=False
+    ):  # there are more places than beads
         shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * layer.play(radius, largest)
         beads.append(
             StandingBead(x + float(shift[0]), y + float(shift[1]), floor + layer.level, radius)
@@ -131,18 +132,20 @@ def check_bodies(case: Case) -> None:
     if boundary.shape == "vessel":
         _check_vessel(case)
     if case.run.ranks > 1 and not boundary.closed:
-        raise unusable(
+        raise key_error(
             "run.ranks", "expected 1: walkers on a plane run slower on several processes"
         )
     if not case.walkers and mixture is None and "seed" in case.document.get("run", {}):
-        raise unusable("run.seed", "expected none with placed beads: every start would be the same")
+        raise key_error(
+            "run.seed", "expected none with placed beads: every start would be the same"
+        )
     if case.liquid.conserved and case.liquid.meniscus_radius is not None:
-        raise unusable(
+        raise key_error(
             "liquid.conserved",
             "expected false: menisci of one radius exchange liquid through a film",
         )
     if case.liquid.conserved and (case.walkers or not boundary.closed):
-        raise unusable(
+        raise key_error(
             "liquid.conserved", "expected false: only loose beads in a container share their liquid"
         )
     if mixture is not None:
@@ -160,9 +163,9 @@ def _check_vessel(case: Case) -> None:
     blamed = "boundary.mesh" if boundary.mesh else "boundary.planes"
     if (walls := len(boundary.walls)) * case.count > _MOST_PARTS:
         most = f"at most {_MOST_PARTS // case.count} for {case.count} beads: a coarser mesh"
-        raise unusable(blamed, f"has {walls} faces, edges and corners; expected {most}")
+        raise key_error(blamed, f"has {walls} faces, edges and corners; expected {most}")
     if case.walkers and boundary.walls[0].name != FLOOR:
-        raise unusable(
+        raise key_error(
             blamed,
             "has no level floor at its bottom, on which walkers stand; expected [[placed]] beads",
         )
@@ -217,7 +220,7 @@ def _check_walls(case: Case, beads: list[_Held]) -> None:
     boundary, top = case.boundary, case.boundary.height or inf
     largest = max((max(walkers.radii) for walkers in case.walkers), default=0.0)
     if boundary.width is not None and boundary.width < 2.0 * (1.0 - OVERLAP) * largest:
-        raise unusable(
+        raise key_error(
             "boundary.width", f"expected more than a bead's diameter, {2e3 * largest:.4g} mm"
         )
     cut = _cut_by_walls(case, beads)
@@ -225,14 +228,14 @@ def _check_walls(case: Case, beads: list[_Held]) -> None:
         number = case.walkers_by_key[
             cut[0].key
         ].replicates  # also a default, which no document quotes
-        raise unusable(f"{cut[0].key}.replicates", _expected_number(case, cut[0].key), number)
+        raise key_error(f"{cut[0].key}.replicates", _expected_number(case, cut[0].key), number)
     high = [bead for bead in beads if bead.place[2] + bead.radius > top]
     if walking := [bead for bead in high if bead.walker >= 0]:
         highest = max(walking, key=lambda bead: bead.place[2] + bead.radius)
         least = (
             f"{ceil(1e6 * (highest.place[2] + highest.radius)) / 1e3:g} mm"  # a number that will do
         )
-        raise unusable(
+        raise key_error(
             "boundary.height",
             f"too low for the walkers of {highest.key}; expected at least {least}",
         )
@@ -240,14 +243,14 @@ def _check_walls(case: Case, beads: list[_Held]) -> None:
         bead for bead in beads if bead.walker < 0 and bead.place[2] < (1.0 - OVERLAP) * bead.radius
     ]
     if out := [*cut, *high, *low]:
-        raise unusable(f"{out[0].key}.at", "expected a bead within the boundary")
+        raise key_error(f"{out[0].key}.at", "expected a bead within the boundary")
 
 
 def _expected_number(case: Case, key: str) -> str:
     """How many walkers of a make fit between the walls beside the others."""
 
     def too_many(number: int) -> bool:
-        fewer = case.put(f"{key}.replicates", number)
+        fewer = case.with_value_at(f"{key}.replicates", number)
         return any(bead.walker >= 0 for bead in _cut_by_walls(fewer, _held(fewer)))
 
     walkers = case.walkers_by_key[key]
@@ -274,9 +277,9 @@ def _check_overlaps(beads: list[_Held]) -> None:
         if apart < touching - OVERLAP * min(first.radius, second.radius):
             if second.walker >= 0:
                 message = f"at their start angles, a bead {overlaps('one of another walker', apart, touching)}"
-                raise unusable(f"{second.key}.spacing", message)
+                raise key_error(f"{second.key}.spacing", message)
             whom = first.key if first.walker < 0 else f"one of {first.key}"
-            raise unusable(f"{second.key}.at", overlaps(whom, apart, touching))
+            raise key_error(f"{second.key}.at", overlaps(whom, apart, touching))
 
 
 def overlaps(whom: str, apart: float, touching: float) -> str:

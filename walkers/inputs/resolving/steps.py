@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from math import atan2, inf
 from typing import Any
 
-from walkers.errors import unusable
+from walkers.errors import key_error
 from walkers.inputs.origins import Source
 from walkers.inputs.resolving.bodies import (
     WalkerDraft,
@@ -27,7 +27,7 @@ from walkers.inputs.resolving.bodies import (
 )
 from walkers.inputs.resolving.driving import drive_of
 from walkers.inputs.resolving.from_library import ROUGHNESS
-from walkers.inputs.resolving.length import limits_of, run_of
+from walkers.inputs.resolving.length import limits_of, resolved_run
 from walkers.inputs.resolving.loads import LARGEST_DELAY, bridge_at_rest, delay_of
 from walkers.inputs.resolving.notes import Notes
 from walkers.inputs.resolving.own_vessel import with_vessel
@@ -83,12 +83,12 @@ def resolve(
     _check_law(setup)
     if file.contact.youngs_modulus is None:
         setup = _hardened(setup, notes)
-    run, sources_of_run = run_of(setup)
+    run, sources_of_run = resolved_run(setup)
     notes.sources |= sources_of_run
-    setup = setup.but(boundary=_with_uphill(setup, notes))
+    setup = setup.with_values(boundary=_with_uphill(setup, notes))
     case = setup.completed(Case, {"run": run, "name": name, "document": document})
     check_walkers_at_rest(case, file, notes)
-    case = case.but(sources=notes.sources)
+    case = case.with_values(sources=notes.sources)
     check_bodies(case)
     return case
 
@@ -137,7 +137,7 @@ def _liquid(liquid: LiquidTable, notes: Notes) -> Liquid:
     viscosity = liquid.dynamic_viscosity
     if liquid.kinematic_viscosity is not None:
         if liquid.density is None:
-            raise unusable(
+            raise key_error(
                 "liquid.density",
                 "missing; expected the liquid's density beside its kinematic_viscosity",
             )
@@ -152,7 +152,7 @@ def _check_surfaces(case: Setup, notes: Notes) -> None:
     roughness = case.contact.roughness
     for key, value in zip(ROUGHNESS, (roughness.bead_bead, roughness.bead_wall), strict=True):
         if value > most * (1.0 + 1e-9):
-            raise unusable(
+            raise key_error(
                 key, f"expected {1e6 * most:.3g} um or less, a hundredth of a bead's radius"
             )
         _end_range_at(key, most, notes)
@@ -161,7 +161,7 @@ def _check_surfaces(case: Setup, notes: Notes) -> None:
             for opposite in (*case.radii, inf):
                 bridge_volume(radius, opposite, liquid)
     except ValueError as error:
-        raise unusable(
+        raise key_error(
             "liquid.meniscus_radius", f"expected menisci that fit between the surfaces: {error}"
         ) from error
 
@@ -183,7 +183,7 @@ def _check_law(case: Setup) -> None:
             for radius in case.radii:
                 bridge_at_rest(case, radius, inf)
         except ValueError as error:
-            raise unusable("liquid.law", str(error)) from error
+            raise key_error("liquid.law", str(error)) from error
 
 
 def _hardened(softened: Setup, notes: Notes) -> Setup:
@@ -194,7 +194,7 @@ def _hardened(softened: Setup, notes: Notes) -> Setup:
     """
     while delay_of(softened) > LARGEST_DELAY and softened.contact.youngs_modulus < _HARDEST:
         modulus = 4.0 * softened.contact.youngs_modulus
-        harder = softened.but(contact=softened.contact.but(youngs_modulus=modulus))
+        harder = softened.with_values(contact=softened.contact.with_values(youngs_modulus=modulus))
         if softened.mixture is not None and _longest_step(harder) < _longest_step(softened):
             break
         softened = harder
@@ -213,8 +213,8 @@ def _with_uphill(case: Setup, notes: Notes) -> Boundary:
     """The boundary with the direction of the steepest way up, from the x axis toward y."""
     boundary = case.boundary
     if not boundary.tilt:
-        return boundary.but(uphill=0.0)
+        return boundary.with_values(uphill=0.0)
     along, across, _ = case.drive_axis
     if boundary.uphill == 0.0:
         notes.add("boundary.uphill", "the direction of the drive", "default", "0 deg")
-    return boundary.but(uphill=atan2(across, along) + boundary.uphill)
+    return boundary.with_values(uphill=atan2(across, along) + boundary.uphill)

@@ -15,7 +15,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import AfterValidator, Field
 
 from walkers.inputs import units
-from walkers.inputs.config_table import Choice, Indirect, Table, key
+from walkers.inputs.config_table import Choice, ConfigTable, Indirect, key
 from walkers.inputs.tables.arrangements import WalkerGeometry
 from walkers.inputs.units import Diameter, Length, Number, Position, Radius, SignedLength, Whole
 from walkers.physics.capillary import bead_volume
@@ -38,7 +38,7 @@ _Range = Annotated[tuple[Radius, Radius], AfterValidator(_ascending)]
 _DiameterRange = Annotated[tuple[Diameter, Diameter], AfterValidator(_ascending)]
 
 
-class WalkersTable(Table):
+class WalkersTable(ConfigTable):
     """What ``[dimers]`` and ``[[clusters]]`` share: walkers of one make, their number and initial state.
 
     They face along the drive axis (right, up a slope), against it (left, down), or every other one (both), but for an
@@ -130,7 +130,7 @@ class Cluster(Walkers, ClusterTable):
     radii: _Radii
 
 
-class MixtureTable(Table):
+class MixtureTable(ConfigTable):
     """``[mixture]``: poured beads of two classes, each of ``sizes`` radii within a range, which occur equally often."""
 
     choices: ClassVar = (
@@ -227,7 +227,7 @@ def share_and_volume(
     return share, share * volumes[0] + (1.0 - share) * volumes[1]
 
 
-class PlacedBeadTable(Table):
+class PlacedBeadTable(ConfigTable):
     """One of ``[[placed]]``: a bead and where it begins, from the middle of the floor."""
 
     choices: ClassVar = (Choice(("radius",), ("diameter",)),)

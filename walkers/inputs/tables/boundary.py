@@ -11,7 +11,15 @@ from typing import Annotated, Any
 from walkers.arrays import Vector
 from walkers.errors import Problem
 from walkers.inputs import units
-from walkers.inputs.config_table import SAME_RUN, Derived, Indirect, Table, key, present, within
+from walkers.inputs.config_table import (
+    SAME_RUN,
+    ConfigTable,
+    Derived,
+    Indirect,
+    key,
+    key_within,
+    present,
+)
 from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.tables.shapes.registry import SHAPES, ShapeName
 from walkers.inputs.tables.shapes.shape import Shape
@@ -23,7 +31,7 @@ _LEAST = 1e-13
 _SIZES = ("opening", "width", "height")
 
 
-class Boundary(Table):
+class Boundary(ConfigTable):
     """``[boundary]``: the walls.
 
     A groove is two walls that meet in the x axis; a container is open above, its floor about the origin. A plane at 90°
@@ -72,7 +80,7 @@ class Boundary(Table):
         if shape == "vessel":
             yield from cls.problems_of(GIVEN_BY, given, place)
         elif named:
-            yield Problem(within(place, "shape"), None, f"expected none beside {place}.{named}")
+            yield Problem(key_within(place, "shape"), None, f"expected none beside {place}.{named}")
             return
         if shape not in SHAPES:
             return
@@ -81,7 +89,7 @@ class Boundary(Table):
             if name in sizes and name not in given:
                 yield cls.missing(name, place)
             elif name in given and name not in sizes:
-                yield Problem(within(place, name), None, f"expected none of a {shape}")
+                yield Problem(key_within(place, name), None, f"expected none of a {shape}")
 
     @property
     def geometry(self) -> Shape:

@@ -20,7 +20,7 @@ from walkers.arrays import Vector
 from walkers.errors import Problem
 from walkers.inputs import units
 from walkers.inputs.bridge_laws import by_name
-from walkers.inputs.config_table import SAME_RUN, Derived, Table, key
+from walkers.inputs.config_table import SAME_RUN, ConfigTable, Derived, key
 from walkers.inputs.keys import MISSING, flatten, is_axis, parts_of, value_at
 from walkers.inputs.origins import Origin, Source, text_of
 from walkers.inputs.tables.bodies import (
@@ -38,14 +38,14 @@ from walkers.inputs.tables.bodies import (
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.drive import AXES, Drive, DriveTable, Excitation
 from walkers.inputs.tables.materials import (
-    Beads,
+    BeadsTable,
     Contact,
     ContactTable,
     Environment,
     Liquid,
     LiquidTable,
 )
-from walkers.inputs.tables.run import Run, RunTable, settling_of
+from walkers.inputs.tables.run import RunSettings, RunTable, settling_of
 from walkers.inputs.units import kind_in
 from walkers.physics.bridge import BridgeLaw
 
@@ -70,13 +70,13 @@ _ABOUT = ("document", "sources", "recorded_law", "uncertain")
 """Fields that comparisons leave out: sources of values, and the law as its run has recorded it."""
 
 
-class CaseFile(Table):
+class CaseFile(ConfigTable):
     """A case file: bodies on a boundary under a drive, with a liquid and contacts."""
 
     title: Annotated[str, SAME_RUN] = key(
         "Title of figures and reports. It does not change the results.", ""
     )
-    beads: Beads = key("")
+    beads: BeadsTable = key("")
     dimers: DimersTable | None = key("", None)
     clusters: Annotated[tuple[ClusterTable, ...], _FEW_KINDS] = key("", ())
     mixture: MixtureTable | None = key("", None)
@@ -255,7 +255,7 @@ class Case(Setup):
     give, and ``recorded_law`` is a user's law as a run has recorded it.
     """
 
-    run: Run
+    run: RunSettings
     name: Annotated[Derived[str], SAME_RUN] = "case"
     document: Annotated[Derived[dict[str, Any]], SAME_RUN] = Field({})
     sources: Annotated[Derived[dict[str, Source]], SAME_RUN] = Field({})
@@ -278,7 +278,7 @@ class Case(Setup):
             "settling_cycles": settling_of(cycles),
             "cycles_per_segment": cycles,
         }
-        return self.but(run=self.run.but(cycles=cycles, **fixed))
+        return self.with_values(run=self.run.with_values(cycles=cycles, **fixed))
 
     @cached_property
     def origins(self) -> tuple[Origin, ...]:

@@ -17,9 +17,9 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
 from walkers.arrays import FloatArray, Vector
-from walkers.errors import Problem, unusable
+from walkers.errors import Problem, key_error
 from walkers.inputs import units
-from walkers.inputs.config_table import Choice, Indirect, Table, key
+from walkers.inputs.config_table import Choice, ConfigTable, Indirect, key
 from walkers.inputs.records.record import FEWEST_PERIODS, Record, course_text, record_of
 from walkers.inputs.units import Angle, Coefficient
 
@@ -81,7 +81,7 @@ _Factors = Annotated[
 ]
 
 
-class _SineTable(Table):
+class _SineTable(ConfigTable):
     """A sine A sin(2π f t + φ) along a direction: its keys in ``[drive]`` and in ``[[drive.harmonics]]``."""
 
     choices: ClassVar[tuple[Choice, ...]] = (Choice(("peak_acceleration",), ("gamma0",)),)
@@ -196,7 +196,7 @@ class Drive(DriveTable):
         """The sum of sines that the keys describe, or the record."""
         if self.record:
             return Excitation(
-                (), self.frame, self.record.but(repeats=bool(self.repeats)), self.ramp
+                (), self.frame, self.record.with_values(repeats=bool(self.repeats)), self.ramp
             )
         if self.harmonics:
             harmonics = tuple(_sine(harmonic) for harmonic in self.harmonics)
@@ -438,7 +438,7 @@ def check_drive(drive: Excitation) -> None:
     largest = units.ACCELERATION.largest
     if drive.ramp and drive.peak_acceleration > largest:
         strongest = f"the largest one gives {drive.peak_acceleration:.6g} m/s²"
-        raise unusable(
+        raise key_error(
             "drive.ramp",
             f"expected factors that give accelerations up to {largest:g} m/s²; {strongest}",
         )
@@ -447,7 +447,7 @@ def check_drive(drive: Excitation) -> None:
             amplitude / units.ACCELERATION_OF_ONE_G for amplitude in record.amplitude_range
         )
         changes = f"the amplitude of drive.record changes by itself, from {low:.3g} to {high:.3g} g"
-        raise unusable("drive.ramp", f"expected none: {changes}")
+        raise key_error("drive.ramp", f"expected none: {changes}")
 
 
 def _check_record(record: Record) -> None:
@@ -455,7 +455,7 @@ def _check_record(record: Record) -> None:
     highest = units.FREQUENCY.largest
     if record.frequencies[1] > highest:
         actual = f"found {record.frequencies[1]:.4g} Hz: is the unit of the time right?"
-        raise unusable(
+        raise key_error(
             "drive.record", f"expected frequencies up to {highest:g} Hz; {actual}", record.file
         )
     periods = record.strongest_line * record.length
@@ -463,7 +463,7 @@ def _check_record(record: Record) -> None:
         least = f"expected at least {FEWEST_PERIODS:g} periods of its strongest line, found {periods:.2g}"
         reason = "the offset of the sensor cannot be told from the shaking"
         cure = "drive.repeats = true takes it as a whole period"
-        raise unusable("drive.record", f"{least}: {reason}; {cure}", record.file)
+        raise key_error("drive.record", f"{least}: {reason}; {cure}", record.file)
 
 
 def common_frequency(frequencies: list[float]) -> float:
@@ -495,7 +495,7 @@ def common_frequency(frequencies: list[float]) -> float:
 def waveform(name: str, first: Harmonic) -> tuple[Harmonic, ...]:
     """The harmonics of a periodic acceleration of `WAVEFORMS`, given its frequency, peak, direction and phase."""
     return tuple(
-        first.but(
+        first.with_values(
             frequency=multiple * first.frequency,
             peak_acceleration=abs(share) * first.peak_acceleration,
             phase=multiple * first.phase + (pi if share < 0.0 else 0.0),

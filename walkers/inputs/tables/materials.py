@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Annotated, ClassVar
 
 from walkers.inputs import units
-from walkers.inputs.config_table import Choice, Indirect, Table, key
+from walkers.inputs.config_table import Choice, ConfigTable, Indirect, key
 from walkers.inputs.units import Coefficient, Number
 from walkers.physics.capillary import DEFAULT_LAW, BridgeLiquid
 
@@ -16,7 +16,7 @@ STIFFEST = 1e11
 _SOFTENED = Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFEST)]
 
 
-class Beads(Table):
+class BeadsTable(ConfigTable):
     """``[beads]``: the material of all beads."""
 
     material: Indirect[str] = key(
@@ -25,7 +25,7 @@ class Beads(Table):
     density: units.Density = key("Density of the beads.")
 
 
-class LiquidTable(Table):
+class LiquidTable(ConfigTable):
     """``[liquid]``: a name from the library, numbers, or both (numbers take precedence)."""
 
     choices: ClassVar = (
@@ -91,7 +91,7 @@ class Liquid(LiquidTable):
         )
 
 
-class Friction(Table):
+class Friction(ConfigTable):
     """``[contact.friction]``: Coulomb coefficients."""
 
     bead_bead: Coefficient = key("Coulomb coefficient between two beads.", example=0.25)
@@ -100,7 +100,7 @@ class Friction(Table):
     )
 
 
-class Roughness(Table):
+class Roughness(ConfigTable):
     """``[contact.roughness]``: gap that remains for the liquid between surfaces that touch at their asperities."""
 
     bead_bead: units.Length = key(
@@ -111,7 +111,7 @@ class Roughness(Table):
     )
 
 
-class ContactTable(Table):
+class ContactTable(ConfigTable):
     """``[contact]``: the model of the contacts, with the Young's modulus of softened beads and walls.
 
     The modulus of ``"auto"`` is 50 MPa for loose beads; for walkers it is the lowest of 50, 200, 800, ... MPa at which
@@ -139,7 +139,7 @@ class Contact(ContactTable):
     youngs_modulus: _SOFTENED
 
 
-class Environment(Table):
+class Environment(ConfigTable):
     """``[environment]``."""
 
     gravity: Annotated[float, replace(units.ACCELERATION, example="9.81 m/s^2")] = key(

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from walkers.inputs import units
-from walkers.inputs.config_table import SAME_RUN, Choice, Derived, Indirect, Table, key
+from walkers.inputs.config_table import SAME_RUN, Choice, ConfigTable, Derived, Indirect, key
 from walkers.inputs.units import AUTO, Duration, Number, Whole
 from walkers.rounding import percent
 
@@ -19,7 +19,7 @@ FIRST_ATTEMPTS = (12, 24)
 CONSTANT = 0.002
 """Share within which the velocities of the halves of a walker's cycles agree where a run ends early: they are constant.
 
-`walkers.postprocess.measure.gait.walk` calls a walker steady by a looser criterion.
+`walkers.postprocess.measure.gait.measure_walk` calls a walker steady by a looser criterion.
 """
 _Cycles = Annotated[Whole, Field(ge=2, le=1_000_000)]
 _Samples = Annotated[Whole, Field(ge=1, le=1000)]
@@ -30,7 +30,7 @@ def settling_of(cycles: int) -> int:
     return min(20, cycles // 3)
 
 
-class RunTable(Table):
+class RunTable(ConfigTable):
     """``[run]``: the time step, the length and the samples of the run.
 
     Beads are recorded ``samples_per_cycle`` times a cycle, or once in ``cycles_per_sample`` (one of the two is 1),
@@ -105,7 +105,7 @@ class RunTable(Table):
     )
 
 
-class Run(RunTable):
+class RunSettings(RunTable):
     """The run of a resolved case.
 
     A case whose beads do not rest before the drive has no values of ``settled_below`` and ``longest_settling``.

@@ -26,10 +26,10 @@ import numpy as np
 from walkers.arrays import BoolArray, FloatArray, IntArray
 from walkers.inputs.tables.shapes.walls import FLOOR as FLOOR_NAME
 from walkers.inputs.tables.shapes.walls import Wall
-from walkers.postprocess.measure.motion import FLOOR, Bridges
+from walkers.postprocess.measure.motion import FLOOR_INDEX, Bridges
 from walkers.postprocess.measure.tables import Columns, columns_of
 
-Cluster = tuple[frozenset[int], frozenset[int]]
+HeldCluster = tuple[frozenset[int], frozenset[int]]
 """Beads of a cluster in a frame, and side walls that hold it."""
 
 MIN_RISE = 2e-3
@@ -81,11 +81,11 @@ def connected(count: int, pairs: IntArray) -> IntArray:
 
 def floor_of(wall_names: Sequence[str]) -> int:
     """Index of the floor among the walls of a container; `NO_FLOOR` in a vessel without one, such as a trough."""
-    return FLOOR if wall_names[FLOOR] == FLOOR_NAME else NO_FLOOR
+    return FLOOR_INDEX if wall_names[FLOOR_INDEX] == FLOOR_NAME else NO_FLOOR
 
 
 def bulk_of(
-    labels: IntArray, bridges: Bridges, *, heap: bool = True, floor: int = FLOOR
+    labels: IntArray, bridges: Bridges, *, heap: bool = True, floor: int = FLOOR_INDEX
 ) -> BoolArray:
     """Whether beads are part of the bulk, shape (N,).
 
@@ -97,15 +97,15 @@ def bulk_of(
     return np.isin(labels, [*most, *on_floor])
 
 
-def at_sides(bridges: Bridges, count: int, floor: int = FLOOR) -> BoolArray:
+def at_sides(bridges: Bridges, count: int, floor: int = FLOOR_INDEX) -> BoolArray:
     """Whether a bridge joins a bead to a side wall, shape (count,)."""
     beads, walls = bridges.at_walls
     return np.isin(np.arange(count), beads[walls != floor])
 
 
 def held_clusters(
-    labels: IntArray, bridges: Bridges, bulk: BoolArray, floor: int = FLOOR
-) -> Iterator[Cluster]:
+    labels: IntArray, bridges: Bridges, bulk: BoolArray, floor: int = FLOOR_INDEX
+) -> Iterator[HeldCluster]:
     """The clusters that are free and held in a frame."""
     beads, walls = bridges.at_walls[:, bridges.at_walls[1] != floor]
     for label in np.unique(labels[beads[~bulk[beads]]]):
@@ -114,7 +114,7 @@ def held_clusters(
             yield frozenset(members.tolist()), frozenset(walls[np.isin(beads, members)].tolist())
 
 
-def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]]) -> list[Track]:
+def follow(time: FloatArray, clusters: Iterable[Sequence[HeldCluster]]) -> list[Track]:
     """Tracks of the clusters of all frames (`held_clusters`; time in s, shape (F,)), in the order of their begins."""
     tracks: list[Track] = []
     alive: list[int] = []
@@ -155,7 +155,7 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[Cluster]]) -> list[Trac
 
 
 @dataclass(frozen=True)
-class Beads:
+class PileBeads:
     """Beads of a pile: time (s, shape (F,)), height (m, shape (F, N)), which are large; first frame of the drive.
 
     ``surface`` and ``bulk`` are the height of the surface and the beads of the bulk in each frame.
@@ -172,7 +172,7 @@ class Beads:
     position: FloatArray | None = None
 
 
-def _left_bulk(track: Track, beads: Beads) -> bool:
+def _left_bulk(track: Track, beads: PileBeads) -> bool:
     """Whether the first beads were in the bulk for some time; others have hung on a wall since before the drive."""
     before, members = slice(beads.first, track.frames[0]), list(track.members[0])
     in_bulk = [bulk[members].mean() >= MIN_OVERLAP for bulk in beads.bulk[before]]
@@ -180,7 +180,7 @@ def _left_bulk(track: Track, beads: Beads) -> bool:
     return bool(seconds >= MAX_GAP)
 
 
-def _walls_apart(walls: Sequence[int], frame: int, members: Sequence[int], beads: Beads) -> int:
+def _walls_apart(walls: Sequence[int], frame: int, members: Sequence[int], beads: PileBeads) -> int:
     """Number of walls at a cluster whose normals differ by 45° or more; two in a corner.
 
     A round vessel of a mesh has many faces: a cluster that touches two of them is not in a corner.
@@ -196,7 +196,7 @@ def _walls_apart(walls: Sequence[int], frame: int, members: Sequence[int], beads
     return len(apart)
 
 
-def climbs_of(tracks: Sequence[Track], beads: Beads) -> Columns:
+def climbs_of(tracks: Sequence[Track], beads: PileBeads) -> Columns:
     """Table ``clusters``: the largest rise of each track of `follow`, and whether the track is a climb.
 
     The largest rise goes from the lowest height to the greatest one after it. A cluster may hang still before and after
@@ -229,7 +229,7 @@ _KINDS = {
 }
 
 
-def _climb_of(number: int, track: Track, beads: Beads) -> dict[str, Any]:
+def _climb_of(number: int, track: Track, beads: PileBeads) -> dict[str, Any]:
     frames, height = np.array(track.frames), beads.height
     gained, seconds = _gained(track, beads.time, height)
     risen = gained - np.minimum.accumulate(gained)
@@ -334,7 +334,7 @@ def _speed(seconds: FloatArray, gained: FloatArray) -> tuple[float, float]:
     )
 
 
-def members_of(tracks: Sequence[Track], beads: Beads) -> Columns:
+def members_of(tracks: Sequence[Track], beads: PileBeads) -> Columns:
     """Table ``members``: by frame, and in a frame in the order in which `held_clusters` gives clusters."""
     clusters = sorted(
         (frame, sorted(members), number)
@@ -352,7 +352,7 @@ def members_of(tracks: Sequence[Track], beads: Beads) -> Columns:
     )
 
 
-def _of_beads(columns: Columns, beads: Beads) -> Columns:
+def _of_beads(columns: Columns, beads: PileBeads) -> Columns:
     """Columns with the time of their frames, and class and height of their beads."""
     frame, bead = columns.pop("frame"), columns["bead"]
     return columns | {
@@ -363,7 +363,7 @@ def _of_beads(columns: Columns, beads: Beads) -> Columns:
 
 
 def assembly_of(
-    tracks: Sequence[Track], climbs: Columns, beads: Beads, bridges: Iterable[Bridges]
+    tracks: Sequence[Track], climbs: Columns, beads: PileBeads, bridges: Iterable[Bridges]
 ) -> Columns:
     """Table ``assembly``: state of the beads of each climb in each frame, from rest until it qualifies.
 
@@ -402,7 +402,7 @@ def assembly_of(
     return _of_beads(columns_of(chain.from_iterable(rows), **kinds, joined=bool), beads)
 
 
-def events_of(tracks: Sequence[Track], climbs: Columns, beads: Beads) -> Columns:
+def events_of(tracks: Sequence[Track], climbs: Columns, beads: PileBeads) -> Columns:
     """Table ``events`` in the order of time, without clusters at the start of the drive and those that may still go on.
 
     A cluster is ``freed`` (it leaves the pile or reaches a wall), ``split`` from another cluster, ``merged`` into

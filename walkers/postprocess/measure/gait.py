@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walkers.arrays import BoolArray, FloatArray
-from walkers.inputs.tables.run import CONSTANT, Run
+from walkers.inputs.tables.run import CONSTANT, RunSettings
 from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.motion import Group, between, read_motion
 from walkers.postprocess.measure.sides import REST, STEADY_SPEED
@@ -158,7 +158,7 @@ def distance_walked(group: Group) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def walk(group: Group) -> Columns:
+def measure_walk(group: Group) -> Columns:
     """Velocities after the settling cycles as in the table ``walkers``, m/s, and whether both halves agree, shape (W,).
 
     They are slopes against time, one sample per cycle (`fit_slopes`): of the distance along the heading, and of the
@@ -195,7 +195,7 @@ def fit_slopes(time: FloatArray, values: FloatArray) -> FloatArray:
     return np.asarray(time @ (values - values.mean(axis=0)) / np.sum(time**2))
 
 
-def settled_samples(run: Run) -> slice:
+def settled_samples(run: RunSettings) -> slice:
     """The samples of whole cycles after the settling ones; each phase occurs equally often."""
     samples = run.samples_per_cycle
     return slice(run.settled_strobes * samples, run.cycles // run.cycles_per_sample * samples)
@@ -275,7 +275,7 @@ def are_constant(directory: Path) -> bool:
 
 
 def _is_constant(group: Group) -> bool:
-    walked, run = walk(group), group.case.run
+    walked, run = measure_walk(group), group.case.run
     turned = np.abs(
         np.diff(group.orientation[:: run.samples_per_cycle][run.settled_strobes :], axis=0)
     )

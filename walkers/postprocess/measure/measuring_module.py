@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     from walkers.inputs.tables.case import Case
     from walkers.postprocess.measure.motion import Motion
-    from walkers.postprocess.measure.numbers import Measured
+    from walkers.postprocess.measure.numbers import Measurement
 
 
 class MeasuringModule(Protocol):
@@ -63,7 +63,7 @@ class MeasuringModule(Protocol):
             Numbers in SI units by their names in the group ``NAME``; empty if there are none.
         """
 
-    def measure(self, motion: Motion) -> Measured:
+    def measure(self, motion: Motion) -> Measurement:
         """Measure a run.
 
         Parameters

@@ -19,7 +19,7 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import FLOOR
 from walkers.postprocess.measure.clusters import connected
 from walkers.postprocess.measure.motion import Bridges, Motion
-from walkers.postprocess.measure.numbers import Measured
+from walkers.postprocess.measure.numbers import Measurement
 from walkers.postprocess.measure.tables import columns_of
 
 NAME = "meetings"
@@ -48,7 +48,7 @@ def derived(case: Case) -> dict[str, float]:
     return {"coverage": float(f"{pi * sum(radius**2 for radius in case.all_radii) / floor:.3g}")}
 
 
-def measure(motion: Motion) -> Measured:
+def measure(motion: Motion) -> Measurement:
     """Table and numbers; walkers that are joined in the first frame merge at that time."""
     (centre, heading), run = places_of(motion), motion.case.run
     frames = np.array([bridges.frame for bridges in motion.bridges])
@@ -72,7 +72,7 @@ def measure(motion: Motion) -> Measured:
     if len(at := frames[chosen]) > 1:
         course = (motion.time[at], centre[at], heading[at], size[chosen], held[chosen])
         numbers |= collective(*course, merged, np.array(motion.case.drive_axis)[:2])
-    return Measured({"meetings": table}, numbers)
+    return Measurement({"meetings": table}, numbers)
 
 
 def _state_of(

@@ -17,11 +17,17 @@ from walkers.inputs.tables.bodies import Walkers
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import Excitation
 from walkers.postprocess.measure.dump import BinaryDump, DumpError, NoNumberError, local_frames
-from walkers.runner.directory import SEGMENT_NAME, case_of, layout_of, run_of, segment_directories
 from walkers.runner.manifest import MANIFEST_NAME
-from walkers.templates.layout import MEAN_SPIN_COLUMNS, Layout, PlacedWalker
+from walkers.runner.run_directory import (
+    SEGMENT_NAME,
+    case_of,
+    read_layout,
+    run_of_segment,
+    segment_directories,
+)
+from walkers.templates.layout import MEAN_SPIN_COLUMNS, DeckLayout, PlacedWalker
 
-FLOOR = 0
+FLOOR_INDEX = 0
 """Index of the floor among the walls of a container; the others are side walls."""
 LEAST_SAMPLES = 8
 """Smallest number of samples per cycle that resolves the motion within a cycle."""
@@ -79,7 +85,7 @@ class Motion:
     @property
     def directory(self) -> Path:
         """The run directory."""
-        return run_of(self.frames[0][0])
+        return run_of_segment(self.frames[0][0])
 
     @property
     def first_driven(self) -> int:
@@ -299,17 +305,19 @@ def read_motion(directory: str | Path) -> Motion:
         raise DumpError(f"{error}: {message}") from error
 
 
-def _opened(path: Path) -> tuple[dict[str, Any], Layout, BinaryDump]:
+def _opened(path: Path) -> tuple[dict[str, Any], DeckLayout, BinaryDump]:
     """Record, layout and bead dump of a segment."""
     place = path / SEGMENT_NAME
     try:
         record = read_json(place)
         record = {name: record[name] for name in ("begin", "end", "drive_from")}
         place = path
-        layout = layout_of(path)
+        layout = read_layout(path)
         if not (path / layout.bead_dump).exists():
             why = "was left out, as the dumps of calibrations, spreads and some archives; to make the run again"
-            raise DumpError(f"{path / layout.bead_dump} {why}: walkers run {run_of(path)} --force")
+            raise DumpError(
+                f"{path / layout.bead_dump} {why}: walkers run {run_of_segment(path)} --force"
+            )
         return record, layout, BinaryDump(path / layout.bead_dump, layout.bead_columns)
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise DumpError(f"{place}: cannot be read ({error})") from error
@@ -321,7 +329,7 @@ class _Part:
 
     path: Path
     record: dict[str, Any]
-    layout: Layout
+    layout: DeckLayout
     dump: BinaryDump
     first: int
 
@@ -477,7 +485,7 @@ def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Itera
         if frames is None or frame in frames
     }
     for segment in dict.fromkeys(segment for segment, _ in motion.frames):
-        layout = layout_of(segment)
+        layout = read_layout(segment)
         pairs = local_frames(segment / layout.pair_bridge_dump, layout.pair_bridge_columns)
         walls = local_frames(segment / layout.wall_bridge_dump, layout.wall_bridge_columns)
         number = -1
@@ -494,7 +502,7 @@ def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Itera
 
 
 def _bridges(
-    motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: Layout
+    motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: DeckLayout
 ) -> Bridges:
     place, pair, wall = (
         motion.position[frame],

@@ -23,7 +23,7 @@ from walkers.rounding import counted, rounded, with_decimals
 
 
 @dataclass(frozen=True)
-class Measured:
+class Measurement:
     """What a module measures: tables, numbers in SI units, reasons to doubt them.
 
     Names of numbers are those of `walkers.postprocess.measure.quantities.GROUPS`. A number that is
@@ -76,7 +76,7 @@ def state(numbers: Mapping[str, Any]) -> str:
         return "came apart"
     thresholds = {verb: numbers.get(f"{verb}_at", nan) for verb in ("stops", "starts")}
     if texts := [
-        f"{verb} at {' '.join(shown(peak, 'm/s^2'))}"
+        f"{verb} at {' '.join(number_text(peak, 'm/s^2'))}"
         for verb, peak in thresholds.items()
         if isfinite(peak)
     ]:
@@ -99,10 +99,12 @@ def in_short(numbers: Mapping[str, Any]) -> str:
         return counted(numbers[main], "climb") if main else "-"
     if text := state(numbers):
         return text
-    text = f"{shown(numbers[main], 'm/s')[0]} mm/s"
+    text = f"{number_text(numbers[main], 'm/s')[0]} mm/s"
     if main == "right_facing":
         right, left = ("up", "down") if numbers["goes_uphill"] else ("right", "left")
-        return f"{text} facing {right}, {shown(numbers['left_facing'], 'm/s')[0]} facing {left}"
+        return (
+            f"{text} facing {right}, {number_text(numbers['left_facing'], 'm/s')[0]} facing {left}"
+        )
     return f"{text} up the slope" if main == "axial_velocity" else text
 
 
@@ -133,7 +135,7 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
             continue
         if number or not any(fnmatchcase(name, pattern) for pattern in SHOWN["if_any"]):
             quantity = declared(name)
-            text, unit = shown(number, quantity.unit)
+            text, unit = number_text(number, quantity.unit)
             listed.append(
                 Row(name, _label(quantity, numbers), text, unit, _errors(numbers, quantity))
             )
@@ -162,7 +164,7 @@ def is_of_up(quantity: Quantity, numbers: Mapping[str, Any]) -> bool:
     return bool(numbers["goes_uphill"] and numbers.get("facing_left") and is_mean_over_up)
 
 
-def shown(number: float, unit: str) -> tuple[str, str]:
+def number_text(number: float, unit: str) -> tuple[str, str]:
     """A number (SI) as text in the displayed unit, and this unit; velocities have all decimals."""
     usual, factor = unit_shown(unit)
     value = number if factor == 1.0 else number * factor
@@ -174,7 +176,7 @@ def _errors(numbers: Mapping[str, Any], quantity: Quantity) -> str:
     parts = []
     if quantity.name == "orientation_end" and numbers["walkers"] > 1:
         ends = (
-            shown(numbers[f"orientation_{end}"], quantity.unit)[0]
+            number_text(numbers[f"orientation_{end}"], quantity.unit)[0]
             for end in ("smallest", "largest")
         )
         parts.append(f"walkers {' to '.join(ends)}")

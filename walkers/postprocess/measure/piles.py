@@ -12,9 +12,9 @@ from walkers.arrays import BoolArray, FloatArray, IntArray
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure import clusters
-from walkers.postprocess.measure.clusters import Beads, Cluster
+from walkers.postprocess.measure.clusters import HeldCluster, PileBeads
 from walkers.postprocess.measure.motion import Bridges, Motion, read_bridges
-from walkers.postprocess.measure.numbers import Measured
+from walkers.postprocess.measure.numbers import Measurement
 from walkers.postprocess.measure.tables import Columns, read_columns
 
 NAME = "piles"
@@ -39,7 +39,7 @@ def has_climbed(motion: Motion) -> bool:
     return bool(measure(motion).numbers["climbs"])
 
 
-def measure(motion: Motion) -> Measured:
+def measure(motion: Motion) -> Measurement:
     """Tables and numbers of the bed and of the clusters."""
     case = motion.case
     wall_names = [wall.name for wall in case.boundary.walls]
@@ -55,7 +55,7 @@ def measure(motion: Motion) -> Measured:
         held.append(list(present) if driven else [])
         rows.append(_state_of(motion, bridges, bulks[-1], held[-1], floor))
     bed = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    beads = Beads(
+    beads = PileBeads(
         time=motion.time,
         height=motion.position[..., 2],
         large=motion.large,
@@ -81,8 +81,8 @@ def measure(motion: Motion) -> Measured:
     ended_by_climb = case.run.until == "climb" and numbers["climbs"] > 0
     if numbers["driven"] < _WHOLE * case.duration and not ended_by_climb:
         early = f"shaken for {numbers['driven']:.3g} s of {case.duration:.3g} s: climbers left the container"
-        return Measured(tables, numbers, (early,))
-    return Measured(tables, numbers)
+        return Measurement(tables, numbers, (early,))
+    return Measurement(tables, numbers)
 
 
 def _of_climbs(clusters: Columns) -> dict[str, Any]:
@@ -130,7 +130,7 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
 
 
 def _state_of(
-    motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[Cluster], floor: int
+    motion: Motion, bridges: Bridges, bulk: BoolArray, held: Sequence[HeldCluster], floor: int
 ) -> dict[str, Any]:
     """The columns of ``bed`` in a frame."""
     frame = bridges.frame

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.motion import Motion
-from walkers.postprocess.measure.numbers import Measured
+from walkers.postprocess.measure.numbers import Measurement
 
 NAME = "record"
 VERSION = 2
@@ -23,9 +23,11 @@ def derived(case: Case) -> dict[str, float]:
     return {"record_length": case.excitation.length}
 
 
-def measure(motion: Motion) -> Measured:
+def measure(motion: Motion) -> Measurement:
     """The time for which the record was run, its share, and the doubts of the record."""
     drive = motion.case.excitation
     run = max(float(motion.time[-1]), 0.0)
     doubts = tuple(drive.record.doubts) if drive.record else ()
-    return Measured({}, {"record_run": run, "record_share": min(run / drive.length, 1.0)}, doubts)
+    return Measurement(
+        {}, {"record_run": run, "record_share": min(run / drive.length, 1.0)}, doubts
+    )

@@ -15,7 +15,7 @@ from math import isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import InputError, refused
+from walkers.errors import InputError, input_error
 from walkers.files import read_json, write_json
 from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.loads import gravity_warnings, softness_warning
@@ -27,14 +27,14 @@ from walkers.postprocess.measure.numbers import MAIN, headline, rows, state
 from walkers.postprocess.measure.tables import Columns, read_columns, read_table, write_table
 from walkers.postprocess.measure.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
 from walkers.rounding import counted, percent
-from walkers.runner.directory import (
+from walkers.runner.manifest import RESULT_NAME, check_unchanged
+from walkers.runner.run_directory import (
     SEGMENT_NAME,
     case_of,
     files_of_segments,
     recomputed,
     segment_directories,
 )
-from walkers.runner.manifest import RESULT_NAME, check_unchanged
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,7 +92,7 @@ class Results(dict[str, Any]):
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types: the numbers, None for NaN, and ``about``."""
-        return {**self.about, **plain(self), "warnings": list(self.warnings)}
+        return {**self.about, **json_numbers(self), "warnings": list(self.warnings)}
 
 
 def modules_of(case: Case) -> list[MeasuringModule]:
@@ -144,7 +144,7 @@ def measure(directory: Path) -> None:
         "by_hand": notes,
         "deck_edited": segment.get("deck_edited", False),
         "tables": list(tables),
-        "numbers": plain(numbers),
+        "numbers": json_numbers(numbers),
         "warnings": warnings,
     }
     with recomputed(directory, [*(f"{name}.parquet" for name in tables), RESULT_NAME]):
@@ -153,7 +153,7 @@ def measure(directory: Path) -> None:
         write_json(directory / RESULT_NAME, contents)
 
 
-def read(directory: str | Path, origins: Sequence[Origin] | None = None) -> Results:
+def read_results(directory: str | Path, origins: Sequence[Origin] | None = None) -> Results:
     """The result of a run, with the bands of a spread beside it and its numerical errors; nothing is written.
 
     ``origins`` are the sources of the values of the case, if they are not those of the case that made the run.
@@ -218,16 +218,18 @@ def recorded(directory: Path) -> dict[str, Any]:
             _ = numbers["goes_uphill"], "velocity" in numbers and numbers["facings_differ"]
         contents["numbers"] = numbers
     except FileNotFoundError as error:
-        raise refused(directory, f"has no {RESULT_NAME}; {again}") from error
+        raise input_error(directory, f"has no {RESULT_NAME}; {again}") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise refused(directory, f"its {RESULT_NAME} cannot be read ({error}); {again}") from error
+        raise input_error(
+            directory, f"its {RESULT_NAME} cannot be read ({error}); {again}"
+        ) from error
     contents.setdefault("deck_edited", False)  # earlier results lack it
     try:
         outdated = version != VERSION or _is_outdated(directory, versions)
     except (OSError, ValueError) as error:
-        raise refused(directory, f"its case cannot be read ({error})") from error
+        raise input_error(directory, f"its case cannot be read ({error})") from error
     if outdated:
-        raise refused(directory, f"was measured by another version of the program; {again}")
+        raise input_error(directory, f"was measured by another version of the program; {again}")
     return contents
 
 
@@ -255,15 +257,15 @@ def ensure_measured(directory: Path) -> None:
     measure(directory)
 
 
-def plain(numbers: Mapping[str, Any]) -> dict[str, Any]:
+def json_numbers(numbers: Mapping[str, Any]) -> dict[str, Any]:
     """Numbers as JSON types: None for those that are not finite."""
-    plain = {
+    json_numbers = {
         name: number.item() if hasattr(number, "item") else number
         for name, number in numbers.items()
     }
     return {
         name: None if isinstance(value, float) and not isfinite(value) else value
-        for name, value in plain.items()
+        for name, value in json_numbers.items()
     }
 
 

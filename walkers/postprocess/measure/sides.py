@@ -26,7 +26,7 @@ _ACROSS = 0.02
 """Cosine: walkers that start across the drive axis, within about 1°, face as ``facing`` says."""
 
 
-def directions(*, uphill: bool) -> tuple[str, str]:
+def direction_names(*, uphill: bool) -> tuple[str, str]:
     """Names of the directions along the drive axis, the positive one first."""
     return ("up", "down") if uphill else ("right", "left")
 
@@ -41,7 +41,7 @@ def sides(facing: npt.ArrayLike, start_angle: npt.ArrayLike) -> IntArray:
     return np.where(np.cos(start_angle) < -_ACROSS, np.negative(facing), facing)
 
 
-def alike(walkers: Mapping[str, Any] | pd.DataFrame, *, uphill: bool) -> BoolArray:
+def same_heading(walkers: Mapping[str, Any] | pd.DataFrame, *, uphill: bool) -> BoolArray:
     """Rows of a table ``walkers`` over which means are taken, shape (W,): on a slope those facing up, if any do."""
     up = sides(walkers["facing"], walkers["start_angle"]) > 0
     return up if uphill and up.any() else up | True

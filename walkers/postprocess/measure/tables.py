@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.files import beside, read_regular
 from walkers.postprocess.measure.quantities import TABLES, declared, matches
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 
 
-def numbered(name: str, values: npt.NDArray[Any]) -> Columns:
+def numbered_columns(name: str, values: npt.NDArray[Any]) -> Columns:
     """Columns ``name_1``, ``name_2``, … of beads or contacts, which are the last axis of the values."""
     return {f"{name}_{number + 1}": values[..., number] for number in range(values.shape[-1])}
 
@@ -139,11 +139,11 @@ def _read(directory: Path, name: str) -> Any:
     path = directory / f"{name}.parquet"
     if not path.exists():
         tables = ", ".join(sorted(path.stem for path in directory.glob("*.parquet")))
-        raise refused(directory, f"has no table {name}; it has {tables or 'none'}")
+        raise input_error(directory, f"has no table {name}; it has {tables or 'none'}")
     try:
         # Not pq.read_table, which imports pandas and pyarrow.dataset: a third of a second.
         return pq.ParquetFile(pa.BufferReader(read_regular(path))).read()
     except (OSError, ValueError) as error:  # errors of pyarrow are both
-        raise refused(
+        raise input_error(
             path, f"cannot be read ({error}); walkers run {directory} measures the run again"
         ) from error

@@ -21,7 +21,7 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.measure.gait import distance_walked
 from walkers.postprocess.measure.motion import Motion
-from walkers.postprocess.measure.numbers import Measured
+from walkers.postprocess.measure.numbers import Measurement
 from walkers.postprocess.measure.sides import REST
 
 NAME = "threshold"
@@ -47,7 +47,7 @@ def derived(case: Case) -> dict[str, float]:  # noqa: ARG001
     return {}
 
 
-def measure(motion: Motion) -> Measured:
+def measure(motion: Motion) -> Measurement:
     """The table ``ramp`` and the numbers: means over the walkers that stop or start.
 
     If the amplitude of a record changes, but no walker stops or starts, there are no numbers: the
@@ -71,7 +71,7 @@ def measure(motion: Motion) -> Measured:
     if not drive.ramp and not any(map(isfinite, numbers.values())):
         low, high = (amplitude / ACCELERATION_OF_ONE_G for amplitude in (peaks.min(), peaks.max()))
         changing = f"the amplitude of the strongest line of the record lies between {low:.3g} and {high:.3g} g"
-        return Measured(
+        return Measurement(
             {"ramp": columns}, {}, (f"{changing}: the velocity is a mean over different drives",)
         )
     doubts = []
@@ -85,7 +85,7 @@ def measure(motion: Motion) -> Measured:
     if len(case.walkers[0].radii) == 2:
         gamma0 = dimer_of(case).gamma0
         numbers |= {f"gamma0_{name}": gamma0(number) for name, number in numbers.items()}
-    return Measured({"ramp": columns}, numbers, tuple(doubts))
+    return Measurement({"ramp": columns}, numbers, tuple(doubts))
 
 
 def _thresholds(moves: BoolArray, peaks: FloatArray, *, by_ramp: bool) -> dict[str, float]:
@@ -102,7 +102,7 @@ def _thresholds(moves: BoolArray, peaks: FloatArray, *, by_ramp: bool) -> dict[s
     """
     change = np.diff(peaks)
     noise = (_EXACT if by_ramp else _REVERSAL) * float(peaks.max())
-    direction = directions(peaks, noise)
+    direction = drive_changes(peaks, noise)
     falls = np.flatnonzero(direction < 0)
     rises = np.flatnonzero(direction > 0)[::-1]
     stops, stops_within = _crossed(moves[falls], peaks[falls + 1], np.abs(change[falls]))
@@ -115,7 +115,7 @@ def _thresholds(moves: BoolArray, peaks: FloatArray, *, by_ramp: bool) -> dict[s
     }
 
 
-def directions(peaks: FloatArray, noise: float) -> IntArray:
+def drive_changes(peaks: FloatArray, noise: float) -> IntArray:
     """Whether the drive rises (1), falls (-1) or neither (0) in each window, shape (K,) for K windows.
 
     It rises from a minimum to the next maximum, and falls from a maximum to the next minimum.

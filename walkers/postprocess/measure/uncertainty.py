@@ -9,7 +9,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.files import read_json
 from walkers.inputs.origins import Origin
 from walkers.inputs.resolving.from_library import OF_LIQUIDS
@@ -151,6 +151,6 @@ def accuracy_of(directory: Path) -> dict[str, Any]:
         return contents
     except (OSError, ValueError) as error:
         text = "was edited or is damaged; measure it again with"
-        raise refused(
+        raise input_error(
             directory / ACCURACY_NAME, f"{text}: walkers run {directory} --accuracy"
         ) from error

@@ -20,17 +20,17 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.measure import gait
 from walkers.postprocess.measure.motion import NEAR, Group, Motion, came_near
-from walkers.postprocess.measure.numbers import Measured
+from walkers.postprocess.measure.numbers import Measurement
 from walkers.postprocess.measure.sides import (
     REST,
     SAME,
     SEPARATED,
     STEADY_SPEED,
-    alike,
     differ,
+    same_heading,
     sides,
 )
-from walkers.postprocess.measure.tables import Columns, numbered
+from walkers.postprocess.measure.tables import Columns, numbered_columns
 from walkers.rounding import counted, percent
 
 NAME = "walking"
@@ -62,13 +62,13 @@ def derived(case: Case) -> dict[str, float]:
     }
 
 
-def measure(motion: Motion) -> Measured:
+def measure(motion: Motion) -> Measurement:
     """Tables and numbers of all walkers; rotation, sliding and contacts are those of the first make."""
     case, groups = motion.case, motion.groups
     of_makes = [tables_of(group) for group in groups]
     tables = {name: _stacked([tables[name] for tables in of_makes]) for name in of_makes[0]}
     walkers, first = tables["walkers"], of_makes[0]["walkers"]
-    first_up = alike(first, uphill=case.goes_uphill)
+    first_up = same_heading(first, uphill=case.goes_uphill)
     numbers = {
         **_velocities(walkers, case),
         **{
@@ -89,12 +89,12 @@ def measure(motion: Motion) -> Measured:
     for number, of_make in (
         enumerate([tables["walkers"] for tables in of_makes], 1) if len(groups) > 1 else ()
     ):
-        velocity = of_make["velocity"][alike(of_make, uphill=case.goes_uphill)]
+        velocity = of_make["velocity"][same_heading(of_make, uphill=case.goes_uphill)]
         numbers[f"velocity_make_{number}"] = float(velocity.mean())
         numbers[f"walkers_make_{number}"] = len(of_make["velocity"])
         numbers[f"steady_make_{number}"] = int(np.sum(of_make["steady"]))
     doubts = (*_doubts(numbers, changes=case.excitation.changes), *_turning(groups, walkers))
-    return Measured({**tables, "bridges": _bridges(motion)}, numbers, doubts)
+    return Measurement({**tables, "bridges": _bridges(motion)}, numbers, doubts)
 
 
 def _doubts(numbers: Mapping[str, Any], *, changes: bool) -> Iterable[str]:
@@ -154,12 +154,12 @@ def tables_of(group: Group) -> dict[str, Columns]:
     starts = ("walker", "make", "facing", "start_angle")
     walkers = {
         **{name: np.array([getattr(walker, name) for walker in group.walkers]) for name in starts},
-        **gait.walk(group),
+        **gait.measure_walk(group),
         "orientation_mean": group.orientation[samples].mean(axis=0),
         "orientation_end": group.orientation[-1],
         "turned_at": group.turned_at,
         "separated_fraction": (group.gap[samples, :, beads:] > reach).any(axis=-1).mean(axis=0),
-        **numbered("rotation", mean.rotation),
+        **numbered_columns("rotation", mean.rotation),
         **_by_kind(beads, sliding=mean.sliding, open=mean.open),
     }
     along = {
@@ -168,7 +168,7 @@ def tables_of(group: Group) -> dict[str, Columns]:
         **dict(zip("xyz", np.moveaxis(group.mass_centre, -1, 0), strict=True)),
         "orientation": group.orientation,
         "velocity": seen.velocity,
-        **numbered("rotation", seen.rotation),
+        **numbered_columns("rotation", seen.rotation),
         **_by_kind(beads, sliding=seen.sliding, gap=group.gap),
     }
     strobe = run.samples_per_cycle
@@ -209,7 +209,7 @@ def _by_kind(beads: int, **contacts: FloatArray) -> Columns:
     """Columns of values at contacts (as in `gait.Gait`): of beads with walls, and ``…_pair_…`` of pairs of beads."""
     columns: Columns = {}
     for name, values in contacts.items():
-        columns |= numbered(name, values[..., :beads]) | numbered(
+        columns |= numbered_columns(name, values[..., :beads]) | numbered_columns(
             f"{name}_pair", values[..., beads:]
         )
     return columns
@@ -263,7 +263,7 @@ def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
     )
     facing = sides(walkers["facing"], walkers["start_angle"])
     right, left = facing > 0, facing < 0
-    meant = velocity[alike(walkers, uphill=case.goes_uphill)]
+    meant = velocity[same_heading(walkers, uphill=case.goes_uphill)]
     separated = _mean(walkers["separated_fraction"])
     # On trays the means include walkers that stopped; by symmetry, both headings are one.
     one_heading = case.meets or _is_symmetric(case)
@@ -277,7 +277,9 @@ def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
         "left_facing": facings[1],
         "right_scatter": _scatter(velocity[right]),
         "left_scatter": _scatter(velocity[left]),
-        "axial_velocity": _mean(axial[alike(walkers, uphill=case.goes_uphill or not case.meets)]),
+        "axial_velocity": _mean(
+            axial[same_heading(walkers, uphill=case.goes_uphill or not case.meets)]
+        ),
         "axial_left_facing": _mean(axial[left]),
         "lateral_velocity": _mean(walkers["lateral_velocity"]),
         "separated_fraction": separated,
@@ -307,7 +309,7 @@ def _work(groups: Sequence[Group], cycles: Columns, walkers: Columns) -> dict[st
     speed = np.where(speed < STEADY_SPEED, nan, speed)
     mass = np.array([gait.mass_of(group) for group in groups])[walkers["make"]]
     lifted = mass * ACCELERATION_OF_ONE_G * speed / case.excitation.frequency
-    meant = alike(walkers, uphill=case.goes_uphill)
+    meant = same_heading(walkers, uphill=case.goes_uphill)
     return {"work": _mean(work[meant]), "cost_of_transport": _mean((work / lifted)[meant])}
 
 
@@ -332,7 +334,7 @@ def _depends_on_start(walkers: Columns, facing: IntArray, case: Case) -> bool:
         walkers["velocity"][kept & (kind == number)] for number in set(kind[kept].tolist())
     )
     return not case.meets and any(
-        differ(float(alike.min()), float(alike.max())) for alike in velocities
+        differ(float(same_heading.min()), float(same_heading.max())) for same_heading in velocities
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.files import beside
 from walkers.text import printable
 
@@ -99,14 +99,14 @@ def check_formats(formats: str | Sequence[str]) -> list[str]:
     ]
     for form in given:
         if form not in FORMATS:
-            raise refused("format", f"{form!r}: expected one of {', '.join(FORMATS)}")
+            raise input_error("format", f"{form!r}: expected one of {', '.join(FORMATS)}")
     return list(dict.fromkeys(given))
 
 
 def check_place(path: Path, *suffixes: str) -> None:
     """Raise `InputError` for a path that is a folder or has none of these suffixes."""
     if path.suffix.lower() not in suffixes or path.is_dir():
-        raise refused(path, f"expected the name of a {' or '.join(suffixes)} file")
+        raise input_error(path, f"expected the name of a {' or '.join(suffixes)} file")
 
 
 def save_figure(

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.caption import caption
 from walkers.postprocess.measure.motion import LEAST_SAMPLES
 from walkers.postprocess.measure.quantities import axis, declared, matches
-from walkers.postprocess.measure.results import Results, read
-from walkers.postprocess.measure.sides import directions, sides
+from walkers.postprocess.measure.results import Results, read_results
+from walkers.postprocess.measure.sides import direction_names, sides
 from walkers.postprocess.measure.tables import Columns
 from walkers.postprocess.show.drawing import (
     FORMATS,
@@ -30,7 +30,7 @@ from walkers.postprocess.show.drawing import (
     styled,
 )
 from walkers.rounding import rounded
-from walkers.runner.directory import case_of
+from walkers.runner.run_directory import case_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,11 +118,11 @@ def plot_run(
     formats = check_formats(formats)
     destination = destination or directory
     if destination.suffix.lower()[1:] in FORMATS and not destination.is_dir():
-        raise refused(destination, "expected a folder, because a run may have several figures")
+        raise input_error(destination, "expected a folder, because a run may have several figures")
     destination.mkdir(parents=True, exist_ok=True)
     return [
         path
-        for name, figure in figures_of(read(directory)).items()
+        for name, figure in figures_of(read_results(directory)).items()
         for path in save_figure(figure, destination / name, [directory.name], formats)
     ]
 
@@ -152,7 +152,7 @@ def _draw(axes: Axes, panel: Panel, columns: Columns, looks: Sequence[Mapping[st
             widen(*(limits.mean() + np.array([-0.5, 0.5]) * least))
 
 
-def looks_of(labels: Sequence[str]) -> list[dict[str, Any]]:
+def line_styles(labels: Sequence[str]) -> list[dict[str, Any]]:
     """Looks of lines, told apart with and without colours; those beyond `MOST_NAMED` are grey, and say how many.
 
     Markers of lines that coincide are beside each other.
@@ -235,7 +235,7 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
     for row in np.argsort(walkers["walker"]):
         degrees, side_way = (
             np.degrees(start - turned)[row],
-            directions(uphill=uphill)[int(side[row] < 0)],
+            direction_names(uphill=uphill)[int(side[row] < 0)],
         )
         aside = f"{side_way} at {degrees:.0f}°" if abs(degrees) > _ASIDE else side_way
         velocity = rounded(1e3 * walkers["axial_velocity" if uphill else "velocity"][row], "mm/s")
@@ -253,7 +253,7 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
         else "seen from above"
     )
     words = {"direction": direction, "reference": reference, "seen": seen}
-    figure, panels = _panels("walk", case, {"cycles": cycles}, [looks_of(labels)] * 3, **words)
+    figure, panels = _panels("walk", case, {"cycles": cycles}, [line_styles(labels)] * 3, **words)
     settled = cycles["time"][case.for_cycles(int(cycles["cycle"].max())).run.settled_strobes]
     for axes in panels[:2]:
         axes.axvspan(0.0, float(settled), color="0.93", zorder=0)
@@ -361,7 +361,7 @@ def paths_figure(case: Case, tables: Tables) -> Figure:
     columns |= {"x": x[:, strobe].ravel(), "y": y[:, strobe].ravel()}
     looks = [
         look | {"marker": "", "linestyle": "-"}
-        for look in looks_of([f"walker {n}" for n in range(len(x))])
+        for look in line_styles([f"walker {n}" for n in range(len(x))])
     ]
     reach = 2.0 * max(make.length for make in case.walkers)
     height = 0.7 * TWO_COLUMNS * min(1.2, max(0.3, (np.ptp(y) + reach) / (np.ptp(x) + reach)))

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from walkers.errors import check_limits, refused
+from walkers.errors import check_limits, input_error
 
 _NUMBER = re.compile(r"[\d.]+(e[-+]?\d+)?", re.IGNORECASE)
 _SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080)}
@@ -21,7 +21,7 @@ def _size(_type: Any, tokens: Any) -> tuple[int, int]:
     if numbers := re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower()):
         return int(numbers[1]), int(numbers[2])
     if text not in _SIZES:
-        raise refused(
+        raise input_error(
             "size", f"{text!r}: expected {', '.join(_SIZES)}, or width and height such as 1280x720"
         )
     return _SIZES[text]
@@ -35,7 +35,7 @@ def _seconds(_type: Any, tokens: Any) -> float:
     try:
         return parse_quantity(f"{text} s" if _NUMBER.fullmatch(text) else text, DURATION)
     except ValueError as error:
-        raise refused(option, f'{text!r}: expected a time such as "0.1 s"') from error
+        raise input_error(option, f'{text!r}: expected a time such as "0.1 s"') from error
 
 
 Seconds = Annotated[float, Parameter(converter=_seconds, metavar="TIME")]

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walkers.arrays import FloatArray
-from walkers.errors import WalkersError, refused
+from walkers.errors import WalkersError, input_error
 from walkers.extras import require
 from walkers.files import beside
 from walkers.postprocess.measure.motion import Motion, read_motion
@@ -56,12 +56,14 @@ def render_film(
     check_place(path, ".mp4", ".gif")
     if is_gif := path.suffix.lower() == ".gif":
         if 100 % options.fps or options.fps > 50:  # pictures last whole hundredths of a second
-            raise refused("fps", f"{options.fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF")
+            raise input_error(
+                "fps", f"{options.fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF"
+            )
     elif wide % 2 or tall % 2:
-        raise refused("size", f"{wide}x{tall}: expected even numbers for an MP4")
+        raise input_error("size", f"{wide}x{tall}: expected even numbers for an MP4")
     else:
         require("film")
-    motion, _ = view.shown_of(read_motion(directory).driven, options.walker)
+    motion, _ = view.motion_in_view(read_motion(directory).driven, options.walker)
     times = film_times(motion, options)
     count, frames = len(times.time), slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
     around = _AROUND_TRAY if view.from_above(motion.case) else _AROUND
@@ -111,7 +113,7 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
         message = (
             f"nothing to show: expected times within the drive, 0 to {last:.4g} s, begin before end"
         )
-        raise refused("begin, end", message)
+        raise input_error("begin, end", message)
     follows, slowdown = motion.follows_cycles, options.slowdown
     if slowdown is None:
         largest = _SECONDS / (end - begin)

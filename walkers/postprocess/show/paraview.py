@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from walkers.errors import check_limits, refused
+from walkers.errors import check_limits, input_error
 from walkers.files import VTK_SCRATCH, scratch_folder
 from walkers.postprocess.measure import piles
 from walkers.postprocess.measure.clusters import connected
@@ -103,7 +103,7 @@ def _earlier(place: Path) -> list[Path]:
     held = f"it holds {foreign[0]}" if foreign else "it is a file" if place.is_file() else ""
     if held := "it is a symbolic link" if place.is_symlink() else held:
         expected = "expected a new or empty folder, or a folder that walkers export has written"
-        raise refused(place, f"{expected}; {held}")
+        raise input_error(place, f"{expected}; {held}")
     return files
 
 

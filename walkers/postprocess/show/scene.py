@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.arrays import FloatArray, IntArray
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure import piles
 from walkers.postprocess.measure.motion import Motion, between, visible_displacement
@@ -58,7 +58,7 @@ _LONG, _ABOUT = 1.5, 1.4
 the first factor. The second factor is the extent of the following view over the extent of the beads."""
 
 
-def shown_of(motion: Motion, walker: int | None) -> tuple[Motion, bool]:
+def motion_in_view(motion: Motion, walker: int | None) -> tuple[Motion, bool]:
     """What pictures and films show: the walker with a number, the first of independent walkers, or all beads.
 
     The second value is whether it is a walker by itself; `InputError` if there is no walker with this number.
@@ -67,7 +67,7 @@ def shown_of(motion: Motion, walker: int | None) -> tuple[Motion, bool]:
         return motion, False
     number, count = walker or 0, len(motion.walkers)
     if not 0 <= number < count:
-        raise refused(
+        raise input_error(
             "walker",
             f"{number}: " + (f"expected 0 to {count - 1}" if count else "the run has no walkers"),
         )

@@ -30,9 +30,9 @@ from walkers.postprocess.show.scene import (
     Window,
     from_the_side,
     gathered,
+    motion_in_view,
     named_direction,
     plan_axes,
-    shown_of,
 )
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 SERIES_NAME, PICTURE_NAME = "series.png", "walker.png"
 """Pictures of all beads, and of one walker."""
-SHOWN = 6
+MOST_PICTURES = 6
 """Pictures in a time series."""
 _PIXELS = 40.0
 """Smallest resolution of a view in pixels per mm, unless it becomes too large."""
@@ -59,7 +59,7 @@ def render_series(
     directory: Path,
     destination: Path | None = None,
     *,
-    images: int = SHOWN,
+    images: int = MOST_PICTURES,
     walker: int | None = None,
 ) -> list[Path]:
     """Render views of a run in rows, with times and scales; walkers, climbers and liquid bridges are coloured.
@@ -78,7 +78,7 @@ def render_series(
     check_limits("images", images, 1, 20)
     if destination is not None:
         check_place(destination, ".png")
-    motion, single = shown_of(read_motion(directory), walker)
+    motion, single = motion_in_view(read_motion(directory), walker)
     path = destination or directory / (PICTURE_NAME if single else SERIES_NAME)
     figure = _figure(
         gathered(motion) if single else motion, even_frames(motion, images), follow=single

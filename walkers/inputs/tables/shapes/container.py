@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from walkers.arrays import FloatArray, Vector
-from walkers.errors import unusable
+from walkers.errors import key_error
 from walkers.inputs.tables.shapes.shape import LOOSE, Layer, Shape, damping_between
 
 NEAREST = (1.0 - 1e-9) * LOOSE
@@ -90,15 +90,15 @@ class Container(Shape):
         """Raise `InputError` unless the beads fit (see `Shape.check_pour`)."""
         if self.width < 4.0 * largest:
             expected = "expected at least two of the large beads side by side"
-            raise unusable("boundary.width", expected)
+            raise key_error("boundary.width", expected)
         layer = self.layer(largest)
         if layer.tight and self.width < 8.0 * largest:
             expected = "expected at least four of the large beads side by side"
-            raise unusable("boundary.width", expected)
+            raise key_error("boundary.width", expected)
         layers = -(-count // len(layer.places)) if layer.places else inf
         level = floor + layers * 2.0 * LOOSE * largest
         if level > 2.0 * self.height:  # walls and simulation go on to there
             expected = "expected a wider boundary"
             if layer.places:
                 expected = f"expected {ceil(level / 2.0 * 1e5) / 100.0:g} mm or more"
-            raise unusable("boundary.height", f"too low for {count} beads; {expected}")
+            raise key_error("boundary.height", f"too low for {count} beads; {expected}")

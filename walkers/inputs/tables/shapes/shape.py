@@ -12,7 +12,7 @@ from math import ceil, inf, sqrt
 from typing import ClassVar, NamedTuple, Self
 
 from walkers.arrays import FloatArray, Vector
-from walkers.errors import unusable
+from walkers.errors import key_error
 from walkers.inputs.tables.shapes.outline import faces_within
 from walkers.inputs.tables.shapes.walls import FLOOR, Flat, Wall
 
@@ -200,7 +200,7 @@ class Shape(ABC):
             If there are fewer places than beads.
         """
         expected = 'expected a container, such as "box": a mixture is poured into it'
-        raise unusable("boundary.shape", expected)
+        raise key_error("boundary.shape", expected)
 
 
 def damping_between(width: float, radius: float) -> float:

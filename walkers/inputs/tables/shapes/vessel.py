@@ -11,9 +11,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from walkers.arrays import FloatArray, Vector
-from walkers.errors import unusable
+from walkers.errors import key_error
 from walkers.inputs import units
-from walkers.inputs.config_table import Choice, Table, key
+from walkers.inputs.config_table import Choice, ConfigTable, key
 from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.meshes.vessel_planes import vessel_between
 from walkers.inputs.meshes.wall_names import names_of_faces
@@ -27,7 +27,7 @@ _PLACES_AT_ONCE = 5000
 """Places from which beads are poured whose distances from the walls are computed together."""
 
 
-class Plane(Table):
+class Plane(ConfigTable):
     """One of ``[[boundary.planes]]``: a point and the normal, toward the beads."""
 
     point: units.Position = key("A point of the plane.", example=["0 mm", "0 mm", "0 mm"])
@@ -112,13 +112,13 @@ class VesselShape(Container):
         upto = f"up to twice its height of {1e3 * self.height:.4g} mm"
         if room:
             fits = f"the vessel has places for {room} beads to be poured from, {upto}"
-            raise unusable("mixture.count", f"{fits}; expected at most {room}")
+            raise key_error("mixture.count", f"{fits}; expected at most {room}")
         across = f"{2e3 * largest:.4g} mm"
         none = f"the vessel has no place to pour a bead of {across} from, {upto}"
         cure = "expected a larger vessel (boundary.scale) or smaller beads"
         if not self.vessel.rims:
             cure += ", or a vessel that is open at its top"
-        raise unusable("mixture.count", f"{none}; {cure}")
+        raise key_error("mixture.count", f"{none}; {cure}")
 
 
 @dataclass(frozen=True)

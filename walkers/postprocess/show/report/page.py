@@ -13,7 +13,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.postprocess.show.drawing import check_place, styled
 from walkers.runner.provenance import PROJECT, software
 from walkers.text import environment
@@ -31,7 +31,7 @@ def check_report(path: Path) -> None:
     """Raise `InputError` unless a path is an .html file in an existing folder."""
     check_place(path, ".html", ".htm")
     if not path.absolute().parent.is_dir():
-        raise refused(path.absolute().parent, "there is no such folder")
+        raise input_error(path.absolute().parent, "there is no such folder")
 
 
 def page_of(title: str, body: str, carried: Mapping[str, str] | None = None) -> str:

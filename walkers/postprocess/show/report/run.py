@@ -20,14 +20,14 @@ from walkers.postprocess.measure.results import (
     has_band,
     headlines,
     not_computed,
-    read,
+    read_results,
 )
 from walkers.postprocess.measure.uncertainty import held_of, held_text
 from walkers.postprocess.show.figures import figures_of
 from walkers.postprocess.show.report.page import LARGEST, NAME, check_report, fill, page_of, svg_of
 from walkers.postprocess.show.report.player import MOST_PLACES, player_of
-from walkers.runner.directory import case_of
 from walkers.runner.manifest import read_manifest
+from walkers.runner.run_directory import case_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,13 +54,13 @@ def report_run(
     require("report")
     path = to or directory / NAME
     check_report(path)
-    results, motion = read(directory, origins), read_motion(directory)
+    results, motion = read_results(directory, origins), read_motion(directory)
     title = motion.case.title or motion.case.name
     run = {
         "name": directory.resolve().name,
         "title": title,
         "summary": f"{caption(motion.case)}.",
-        "shown": shown_of(motion.case, results, origins),
+        "shown": report_values(motion.case, results, origins),
         "manifest": read_manifest(directory),
         "figures": {
             name: svg_of(figure) for name, figure in {**figures_of(results), **figures}.items()
@@ -84,7 +84,7 @@ def report_run(
     return path
 
 
-def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str, Any]:
+def report_values(case: Case, results: Results, origins: Origins = None) -> dict[str, Any]:
     """Warnings and rows of a result, what of it is not computed, and parameters of its case with their origins."""
     origins = case.origins if origins is None else origins
     parameters = [
@@ -109,7 +109,7 @@ def shown_of(case: Case, results: Results, origins: Origins = None) -> dict[str,
 
 def result_html(results: Results, origins: Origins = None) -> str:
     """A result as an HTML fragment: table with errors and units, warnings, collapsed parameters."""
-    shown = shown_of(case_of(results.directory), results, origins)
+    shown = report_values(case_of(results.directory), results, origins)
     return fill(
         "result.html.j2", headlines=headlines(results), shown=shown, run=results.directory.name
     )

@@ -25,7 +25,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from walkers.errors import refused
+from walkers.errors import input_error
 from walkers.files import fsync_path, link_or_copy, open_regular, read_json, write_bytes, write_json
 from walkers.inputs.bridge_laws import source_of, source_sha256
 from walkers.inputs.case_building import stored_case
@@ -52,9 +52,9 @@ from walkers.templates.deck import (
     RESTART_NAME,
     Deck,
     Segment,
-    tables_of,
+    bridge_tables_of,
 )
-from walkers.templates.layout import Layout
+from walkers.templates.layout import DeckLayout
 
 CASE_NAME = "case.json"
 LAW_NAME = "law.py"
@@ -160,7 +160,7 @@ def with_recorded_law(case: Case, directory: Path) -> Case:
     law = RecordedLaw(
         tables.read_text("utf-8") if tables else "", source.read_bytes() if source else None
     )
-    return case.but(recorded_law=law)
+    return case.with_values(recorded_law=law)
 
 
 def write_case(directory: Path, case: Case) -> None:
@@ -168,7 +168,7 @@ def write_case(directory: Path, case: Case) -> None:
     write_json(directory / CASE_NAME, case.as_dict(), at_once=False)
     if case.liquid.law in LAWS:
         return
-    tables = tables_of(
+    tables = bridge_tables_of(
         case, [(case.contact, case.liquid.of_bridges)], {(1, radius) for radius in case.radii}
     )
     write_bytes(directory / BRIDGES_NAME, tables.encode("utf-8"), at_once=False)
@@ -179,9 +179,9 @@ def write_case(directory: Path, case: Case) -> None:
         write_bytes(directory / LAW_NAME, source, at_once=False)
 
 
-def layout_of(segment: Path) -> Layout:
+def read_layout(segment: Path) -> DeckLayout:
     """Layout of the dumps of a segment; raises `OSError`, `ValueError`, `KeyError` or `TypeError` if unreadable."""
-    return Layout(**read_json(segment / LAYOUT_NAME))
+    return DeckLayout(**read_json(segment / LAYOUT_NAME))
 
 
 def segment_directories(directory: Path) -> list[Path]:
@@ -190,7 +190,7 @@ def segment_directories(directory: Path) -> list[Path]:
     return segments or ([directory] if (directory / SEGMENT_NAME).is_file() else [])
 
 
-def run_of(segment: Path) -> Path:
+def run_of_segment(segment: Path) -> Path:
     """The run directory of a segment."""
     return segment.parent.parent if segment.parent.name == SEGMENTS else segment
 
@@ -198,7 +198,7 @@ def run_of(segment: Path) -> Path:
 def files_of_segments(directory: Path) -> list[str]:
     """Input and output files of the engine for a run, as paths within its directory."""
     segments = segment_directories(directory)
-    dumps = {name for segment in segments[:1] for name in layout_of(segment).dumps}
+    dumps = {name for segment in segments[:1] for name in read_layout(segment).dumps}
     files = [path for segment in segments for path in segment.iterdir() if path.is_file()]
     by_hand = [directory] == segments  # with tables and pictures beside
     return [
@@ -211,7 +211,7 @@ def files_of_segments(directory: Path) -> list[str]:
 def leave_out_dumps(directory: Path) -> None:
     """Remove dumps, restart files and tables of bridges of a finished run that is locked; its manifest says so."""
     contents = read_manifest(directory)
-    dumps = {*layout_of(segment_directories(directory)[0]).dumps, RESTART_NAME, BRIDGES_NAME}
+    dumps = {*read_layout(segment_directories(directory)[0]).dumps, RESTART_NAME, BRIDGES_NAME}
     names = [name for name in contents["files"] if "/" in name and Path(name).name in dumps]
     write_json(directory / MANIFEST_NAME, {**contents, "left_out": names})
     for name in names:
@@ -412,7 +412,7 @@ def _lock(file: Path, end: float) -> int | None:
             needed = "expected a folder on a file system with locks (flock)"
             advice = "choose another one with --out, or out= in Python"
             message = f"files cannot be locked ({error.strerror}): {needed}; {advice}"
-            raise refused(file.parent, message) from error
+            raise input_error(file.parent, message) from error
         os.close(descriptor)
 
 
