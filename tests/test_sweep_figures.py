@@ -24,7 +24,7 @@ from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.left_out import LeftOutWarning
 from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.table import SweepTable, table_of
-from walkers.theory.prediction import MODEL, PAPER, predict
+from walkers.theory.prediction import COULOMB_MODEL, PAPER_FIT, predict
 
 
 def figure_of(frame: pd.DataFrame, options: FigureOptions = FigureOptions()) -> Figure:
@@ -359,7 +359,7 @@ def test_theory_is_what_the_theory_says_of_each_point(looked_through: Path) -> N
     directory = looked_through / "grid"
     figure = walkers.load(directory).figure(theory=True)
     (axes,) = _panels(figure)
-    assert _legend(figure)[2:] == [MODEL, PAPER]
+    assert _legend(figure)[2:] == [COULOMB_MODEL, PAPER_FIT]
     lines = {line.get_linestyle(): line for line in axes.lines if line.get_color() == COLOURS[1]}
     table = walkers.load(directory).table()
     predicted = [

@@ -16,7 +16,7 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.measure.results import json_numbers
 from walkers.runner.run_directory import case_of
-from walkers.theory.prediction import MODEL, PAPER, predicted_column
+from walkers.theory.prediction import COULOMB_MODEL, PAPER_FIT, predicted_column
 
 Numbers = Mapping[str, Mapping[str, float]]
 """Quantities of walkers by experiment of the calibration."""
@@ -90,7 +90,7 @@ def _by_theory(cases: Mapping[str, Case]) -> Numbers:
     numbers: dict[str, dict[str, float]] = {label: defaultdict(lambda: nan) for label in cases}
     for quantity in {observation.quantity for observation in ruby().file.observations}:
         values = predicted_column(list(cases.values()), quantity)[0].get(
-            MODEL, np.full(len(cases), nan)
+            COULOMB_MODEL, np.full(len(cases), nan)
         )
         for label, value in zip(cases, values, strict=True):
             numbers[label][quantity] = float(value)
@@ -154,8 +154,8 @@ def _curve(
     )
     models_of_curve = {
         "engine": table["velocity"],
-        "theory": models.get(MODEL, nan),
-        "curve": models.get(PAPER, nan),
+        "theory": models.get(COULOMB_MODEL, nan),
+        "curve": models.get(PAPER_FIT, nan),
     }
     numbers = table[[column]].astype(float).round(_PLACES).assign(**models_of_curve)
     rows = []

@@ -24,7 +24,7 @@ from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.table import table_of
-from walkers.theory.prediction import MODEL, motion_of, predicted_column
+from walkers.theory.prediction import COULOMB_MODEL, motion_of, predicted_column
 from walkers.theory.quasistatic import translation
 
 if TYPE_CHECKING:
@@ -120,7 +120,7 @@ def fig2_threshold(sources: Sources) -> Figure:
         mfc="none",
         label="engine: one run, the drive falls",
     )
-    axes.plot(frequencies, theory, "--", color="0.2", lw=0.9, label=MODEL)
+    axes.plot(frequencies, theory, "--", color="0.2", lw=0.9, label=COULOMB_MODEL)
     axes.set(xlabel="frequency (Hz)", ylabel=r"threshold of motion $\Gamma_\mathrm{c}$")
     axes.set(xticks=frequencies, ylim=(0.0, 1.3 * float(np.nanmax([*high, *theory]))))
     legend_below(axes)
@@ -137,7 +137,7 @@ def fig4(sources: Sources) -> Figure:
             trajectory = sources.trajectory(row["run"])
             _draw_cycles(panel, trajectory, row, letter)
             panel.set_title(f"{described(trajectory.case)}\n$\\Gamma_0$ = {row['gamma0']:.3g}")
-        panel.plot([], [], color="0.3", lw=0.9, label=MODEL)
+        panel.plot([], [], color="0.3", lw=0.9, label=COULOMB_MODEL)
         panel.plot([], [], color="0.3", lw=1.0, ls=_MEASURED_DASHES, label="measured mean")
         legend_below(panel, title="means in mm/s")
     letter_panels(axes)

@@ -28,8 +28,8 @@ _TRIALS = 33
 _ROUNDS = 3
 _STRONGEST = 16.0
 """Largest Γ0 at which contacts are tried, over the largest normal force at rest (unit 4πγR̄)."""
-MODEL = "theory: Coulomb friction and drag"
-PAPER = f"theory: paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
+COULOMB_MODEL = "theory: Coulomb friction and drag"
+PAPER_FIT = f"theory: paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
 """Coulomb friction with the resistance of bridges (`motion_of`); the model of the paper, for the cases to which its
 friction was fitted (`walkers.theory.quasistatic.mean_velocity`)."""
 _BEADS, _BOUNDARIES, _LIQUIDS = "ruby", ("chromium-coated glass", "glass"), ("Si AK5", "Si AK10")
@@ -325,7 +325,7 @@ def predicted_column(
     """Predictions of the models for a column of the table of a sweep of N cases, such as ``velocity`` or ``sliding_1``.
 
     Returns values of each model by its name, m/s, shape (N,), NaN where it does not apply (none if no model has the
-    column or applies to any point); and reasons why points lack a value of `MODEL`, or velocities one of `PAPER`, and
+    column or applies to any point); and reasons why points lack a value of `COULOMB_MODEL`, or velocities one of `PAPER_FIT`, and
     how points are outside of the paper's measurements, where no model is tested, with the number of points.
     """
     family, _, number = column.replace("_pair_1", "_3").rpartition("_")  # contact 3 of the theory
@@ -346,12 +346,12 @@ def predicted_column(
     for place in applicable if is_velocity else ():
         case, dimer = cases[place], dimer_of(cases[place])
         if reason := why_not_the_paper(case):
-            reasons[f"{PAPER}: {reason}"] += 1
+            reasons[f"{PAPER_FIT}: {reason}"] += 1
         else:
             paper[place] = mean_velocity(
                 dimer.gamma0(case.excitation.peak_acceleration), dimer.sin_delta
             )
-    models = {MODEL: model, PAPER: paper}
+    models = {COULOMB_MODEL: model, PAPER_FIT: paper}
     if beyond := [sentence for case in cases if (sentence := outside_of_the_paper(case))]:
         reasons[beyond[0] + (", …" if len(beyond) > 1 else "")] = len(beyond)
     return {name: values for name, values in models.items() if np.isfinite(values).any()}, dict(
