@@ -28,12 +28,8 @@ from walkers.sweeps.record import read_sweep_record, write_record
 from walkers.sweeps.scheduler import SweepOptions, plan_sweep, run_sweep
 from walkers.text import rendered
 from walkers.theory.mathieu import alignment
-from walkers.theory.prediction import (
-    alignment_of,
-    motion_of,
-    outside_of_the_paper,
-    predicted_column,
-)
+from walkers.theory.paper_range import outside_of_the_paper
+from walkers.theory.prediction import alignment_of, motion_of, predicted_column
 
 SHORT = {"dimers.replicates": 2, "run.cycles": 8, "run.settling_cycles": 4}
 FEWER: dict[str, dict[str, Any]] = {

@@ -31,7 +31,8 @@ from walkers.theory.mathieu import (
     turning_rate,
 )
 from walkers.theory.motion import Walker, predict_motion
-from walkers.theory.prediction import alignment_of, motion_of, predict, prediction_text, threshold
+from walkers.theory.prediction import alignment_of, motion_of, predict, threshold
+from walkers.theory.prediction_text import prediction_text
 from walkers.theory.quasistatic import CONTACTS, detachment, mass_asymmetry, mean_velocity
 
 

@@ -37,7 +37,8 @@ from walkers.sweeps.accuracy import measure_accuracy, times_of
 from walkers.sweeps.listing import inventory, listing_text
 from walkers.sweeps.scheduler import SweepOptions
 from walkers.sweeps.table import default_column
-from walkers.theory.prediction import predict, prediction_text
+from walkers.theory.prediction import predict
+from walkers.theory.prediction_text import prediction_text
 
 
 def test_what_is_usual_lies_within_its_range() -> None:

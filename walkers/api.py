@@ -753,13 +753,14 @@ def predict(case: Given, out: str | Path = DEFAULT_OUT, changes: Changes = None)
     See `walkers.theory.prediction.predict`.
     """
     from walkers.theory import prediction
+    from walkers.theory.paper_range import outside_of_the_paper
 
     named = find(case, out, changes)
     try:
         predicted = prediction.predict(named.case)
     except prediction.NotApplicable as error:
         raise InputError(named.case.name, [Problem(error.key, None, error.reason)]) from error
-    predicted["outside"] = prediction.outside_of_the_paper(named.case)
+    predicted["outside"] = outside_of_the_paper(named.case)
     predicted["engine"] = None
     if named.finished_run:
         with suppress(InputError):  # a result that cannot be read

@@ -61,11 +61,11 @@ def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = 
         Print the theory's prediction, with the result of the run if it exists.
     """
     if theory:
-        from walkers.theory.prediction import prediction_text as describe_prediction
+        from walkers.theory.prediction_text import prediction_text
 
         predicted = walkers.predict(case, at.out, at.values)
         print_as(
-            as_json, lambda: predicted, lambda: describe_prediction(predicted, predicted["engine"])
+            as_json, lambda: predicted, lambda: prediction_text(predicted, predicted["engine"])
         )
         return
     from walkers.runs.names import find
