@@ -132,7 +132,7 @@ def test_bridges_are_the_law_between_its_knots() -> None:
     """Pull and resistances, at gaps that are none of the splines', to 1e-8."""
     case = full_case({})
     bridges = second_engine(case, scene_of([over(FLOOR, 0.0, RADIUS)])).constants.bridges
-    surfaces = Surfaces.of(RADIUS, inf, case.liquid.of_bridges, case.contact.roughness)
+    surfaces = Surfaces.between(RADIUS, inf, case.liquid.of_bridges, case.contact.roughness)
     curve = by_name(case.liquid.law)(surfaces)
     for gap in np.linspace(0.0, 0.999 * curve.rupture, 777):
         expected = curve.forces(np.array([gap])).columns()[0]

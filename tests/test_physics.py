@@ -27,7 +27,7 @@ from walkers.inputs.tables.materials import Roughness
 from walkers.physics import reynolds
 from walkers.physics.bridge import Surfaces
 from walkers.physics.capillary import BridgeLiquid, largest_normal, share_of_bead
-from walkers.physics.capillary import rupture_distance as rupture_of_lian
+from walkers.physics.capillary import rupture_distance_of_lian
 from walkers.physics.laplace import force_curve, rupture_distance
 from walkers.physics.laws import LAWS, rabinovich, willett, young_laplace
 from walkers.physics.time_step import FRACTIONS
@@ -132,7 +132,7 @@ def test_published_fits_between_equal_spheres(
     given = (1.0, 1.0, volume, radians(degrees))
     rupture = rupture_distance(*given)
     assert rupture == pytest.approx(willett.rupture(*given), rel=tolerance)
-    assert rupture == pytest.approx(rupture_of_lian(*given[2:]), rel=0.08)
+    assert rupture == pytest.approx(rupture_distance_of_lian(*given[2:]), rel=0.08)
     gaps = np.linspace(0.0, 0.9 * min(rupture, willett.rupture(*given)), 40)
     forces = force_curve(*given, gaps).forces
     assert willett.pull(*given, gaps) == pytest.approx(forces, abs=0.03 * forces[0])
@@ -184,7 +184,7 @@ def test_the_stock_engines_law_of_soulie(other: float) -> None:
         1.0 if other == inf else 1.0 / 3.0,
     )
     found = curve.forces(gaps)
-    assert curve.rupture == rupture_of_lian(0.01, 0.3) == pytest.approx(1.15 * 0.01 ** (1.0 / 3.0))
+    assert curve.rupture == rupture_distance_of_lian(0.01, 0.3) == pytest.approx(1.15 * 0.01 ** (1.0 / 3.0))
     pull = np.exp(-12.630 * np.maximum(gaps, 0.0) + 0.49273) + 0.069711
     assert found.pull == pytest.approx(pi * (2.0 if other == inf else sqrt(0.5)) * pull, rel=1e-4)
     near = np.maximum(0.01, gaps) / reduced
@@ -296,11 +296,11 @@ def test_menisci_of_one_radius_have_one_suction(other: float, meniscus: float) -
             contact_angle=angle,
             meniscus_radius=meniscus,
         )
-        given = Surfaces.of(0.3e-3, other, liquid, Roughness(bead_bead=1e-8, bead_wall=1e-8))
+        given = Surfaces.between(0.3e-3, other, liquid, Roughness(bead_bead=1e-8, bead_wall=1e-8))
         solved = force_curve(given.radius, given.other_radius, given.volume, angle, [0.0])
         assert solved.bridges[0, 2] == pytest.approx(-1.0 / meniscus, rel=1e-8)
     tiny = replace(liquid, contact_angle=0.0, meniscus_radius=1e-8)
-    volume = Surfaces.of(0.3e-3, other, tiny, Roughness(bead_bead=1e-8, bead_wall=1e-8)).volume
+    volume = Surfaces.between(0.3e-3, other, tiny, Roughness(bead_bead=1e-8, bead_wall=1e-8)).volume
     assert volume == pytest.approx(4.0 * pi * given.reduced_radius * 1e-16, rel=0.03, abs=0.0)
 
 
@@ -517,7 +517,7 @@ def test_the_viscous_limit_is_of_no_less_than_bridges_resist(law: str) -> None:
         (case.liquid.of_bridges, case.contact.roughness),
     )
     wall, pair = (
-        by_name(law)(Surfaces.of(3e-4, other, *given)).forces(np.zeros(1)).normal[0]
+        by_name(law)(Surfaces.between(3e-4, other, *given)).forces(np.zeros(1)).normal[0]
         for other in (inf, 3e-4)
     )
     share = 0.5 * limits_of(case).viscous * (wall + 2.0 * pair) / mass

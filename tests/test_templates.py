@@ -253,7 +253,7 @@ def test_a_change_of_what_decks_compute_asks_for_another_version() -> None:
 @pytest.mark.parametrize("name", LAWS)
 def test_the_engine_reads_the_law_out_of_its_table(name: str, other: float) -> None:
     case, law = make_case(liquid={"contact_angle": "20 deg"}), by_name(name)
-    given = Surfaces.of(3e-4, other, case.liquid.of_bridges, case.contact.roughness)
+    given = Surfaces.between(3e-4, other, case.liquid.of_bridges, case.contact.roughness)
     table = tabulated(law, given)
     gaps = table.curve.rupture * np.random.default_rng(1).random(200) ** 3
     expected = law(given).forces(gaps).columns()

@@ -37,7 +37,7 @@ class Law(NamedTuple):
 
     pull: Callable[[float, float, float, float, FloatArray], FloatArray]
     rupture: Callable[[float, float, float, float], float] = lambda *bridge: (
-        capillary.rupture_distance(*bridge[2:])
+        capillary.rupture_distance_of_lian(*bridge[2:])
     )
     error: float = inf
 

@@ -1,23 +1,28 @@
-"""Interface of a bridge law: the pull and the resistances between two surfaces as functions of their gap.
+"""Interface of a bridge law: capillary force and resistances between two surfaces as functions of
+their gap.
 
-The surfaces 1 and 2 are two spheres, or a sphere and a plane. The unit vector n points from 2 to 1, h is the gap, l1
-and l2 are the distances of the centres from the middle of the contact. Three velocities describe the relative motion::
+The surfaces 1 and 2 are two spheres, or a sphere and a plane. The unit vector n points from 2 to 1,
+h is the gap, l1 and l2 are the distances of the centres from the middle of the contact. Three
+velocities describe the relative motion::
 
     normal    w = (v1 - v2) · n
     sliding   s = (v1 - v2) - w n + n × (l1 ω1 + l2 ω2)       of the surfaces at the contact
     rolling   q = n × (ω1 - ω2)                               rad/s
 
-A law gives the pull P and the resistances N, S, C and Q as functions of h. The force on 1 and the torque are::
+A law gives the capillary force P (``pull``) and the resistances N, S, C and Q as functions of h.
+The force on 1 and the torque are::
 
     F = -(P + N w) n - (S s + C q),        M = -(C s + Q q).
 
-The torques on the bodies are -l1 n × F - n × M on 1 and -l2 n × F + n × M on 2. Momentum and angular momentum are
-therefore conserved. The dissipated power N w² + S s² + 2 C s·q + Q q² is not negative if N, S, Q ≥ 0 and C² ≤ S Q. A
-drag c on the velocity of a centre along a plane, v = s - l1 q, corresponds to S = c, C = -c l1 and Q = c l1².
+The torques on the bodies are -l1 n × F - n × M on 1 and -l2 n × F + n × M on 2. Momentum and
+angular momentum are therefore conserved. The dissipated power N w² + S s² + 2 C s·q + Q q² is not
+negative if N, S, Q ≥ 0 and C² ≤ S Q. A drag c on the velocity of a centre along a plane, v = s - l1
+q, corresponds to S = c, C = -c l1 and Q = c l1².
 
-Body 1 is the bead at a plane, or the smaller one of two beads. If the other bead is body 1, C changes its sign.
+Body 1 is the bead at a plane, or the smaller one of two beads. If the other bead is body 1, C
+changes its sign.
 
-Surfaces that overlap (h < 0) have the pull and the resistances of h = 0.
+Surfaces that overlap (h < 0) have the capillary force and the resistances of h = 0.
 """
 
 from __future__ import annotations
@@ -32,7 +37,14 @@ import numpy as np
 from walkers.arrays import FloatArray
 from walkers.physics.capillary import BridgeLiquid, bridge_volume, film_volume, share_of_bead
 
-_COLUMNS = ("pull", "normal resistance", "sliding resistance", "coupling", "rolling resistance")
+_COLUMNS = {
+    "pull": "pull",
+    "normal": "normal resistance",
+    "sliding": "sliding resistance",
+    "coupling": "coupling",
+    "rolling": "rolling resistance",
+}
+"""Fields of `Forces` in the order of the columns of tables, and their names in messages."""
 
 
 class UnusableLawError(ValueError):
@@ -55,42 +67,66 @@ class Roughness(Protocol):
 class Surfaces:
     """Two surfaces with a bridge between them."""
 
-    radius: float  #: of the bead, or of the smaller one of two beads, m
-    other_radius: float  #: of the other bead, infinite for a plane, m
-    volume: float  #: of the bridge, m³
+    radius: float
+    """Radius of the bead, or of the smaller one of two beads, m."""
+    other_radius: float
+    """Radius of the other bead, infinite for a plane, m."""
+    volume: float
+    """Volume of the bridge, m³."""
     liquid: BridgeLiquid
-    roughness: (
-        float  #: gap that remains for the liquid between surfaces that touch at their asperities, m
-    )
+    """The liquid of the bridge."""
+    roughness: float
+    """Gap that remains for the liquid between surfaces that touch at their asperities, m."""
 
     @classmethod
-    def of(
+    def between(
         cls, radius: float, other_radius: float, liquid: BridgeLiquid, roughness: Roughness
     ) -> Surfaces:
-        """Make the surfaces of a bead and another bead or a plane (infinite radius), and the volume of their bridge."""
+        """The surfaces of a bead and of another bead or a plane, whose bridge has the volume that
+        the liquid gives it.
+
+        Parameters
+        ----------
+        radius, other_radius
+            Radii in any order, m; infinite for a plane.
+        liquid
+            The liquid on the surfaces.
+        roughness
+            Roughness of pairs of beads, and of a bead at a plane.
+        """
         small, large = sorted((radius, other_radius))
-        rough = roughness.bead_wall if large == inf else roughness.bead_bead
-        return cls(small, large, bridge_volume(small, large, liquid), liquid, rough)
+        gap_of_asperities = roughness.bead_wall if large == inf else roughness.bead_bead
+        volume = bridge_volume(small, large, liquid)
+        return cls(small, large, volume, liquid, gap_of_asperities)
 
     @property
     def volumes(self) -> list[Surfaces]:
-        """The pair with each volume that its bridge may have: one, or where liquid is conserved, steps of √2.
+        """The surfaces with each volume that their bridge may have.
 
-        The films of beads without other bridges give ``volume``; steps end at a sixteenth of it, and at √2 times it for
-        films that are fuller, because bridges that break leave them more than they took.
+        There is one volume unless liquid is conserved. Then there are volumes in steps of √2. The
+        films of beads without other bridges give ``volume``. The steps begin at a sixteenth of it,
+        for films from which other bridges have taken liquid, and end at √2 times it, because
+        bridges that break leave films more than they took.
         """
-        steps = range(-8, 2) if self.liquid.conserved else (0,)
-        return [replace(self, volume=self.volume * sqrt(2.0**step)) for step in steps]
+        if not self.liquid.conserved:
+            return [self]
+        return [replace(self, volume=self.volume * sqrt(2.0**step)) for step in range(-8, 2)]
 
     @property
     def films(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """What each surface contributes to a bridge of full films, and its liquid, m³ (a wall has none)."""
-        fraction, small, large = self.liquid.volume_fraction, self.radius, self.other_radius
-        shares = share_of_bead(small, large, fraction), share_of_bead(large, small, fraction)
-        return shares, (
-            film_volume(small, fraction),
-            inf if self.at_wall else film_volume(large, fraction),
+        """What each surface gives to a bridge if its film is full, and the volume of each full
+        film, m³.
+
+        A wall gives nothing, and its film is infinite.
+        """
+        fraction = self.liquid.volume_fraction
+        shares = (
+            share_of_bead(self.radius, self.other_radius, fraction),
+            share_of_bead(self.other_radius, self.radius, fraction),
         )
+        film = film_volume(self.radius, fraction)
+        other_film = inf if self.at_wall else film_volume(self.other_radius, fraction)
+        return shares, (film, other_film)
 
     @property
     def at_wall(self) -> bool:
@@ -100,42 +136,58 @@ class Surfaces:
     @property
     def reduced_radius(self) -> float:
         """Reduced radius R1 R2/(R1 + R2); at a plane, the radius of the bead; m."""
-        return (
-            self.radius
-            if self.at_wall
-            else self.radius * self.other_radius / (self.radius + self.other_radius)
-        )
+        if self.at_wall:
+            return self.radius
+        return self.radius * self.other_radius / (self.radius + self.other_radius)
 
 
 @dataclass(frozen=True)
 class Forces:
-    """Pull and resistances of the module at given gaps, each of shape (n,)."""
+    """Capillary force and resistances (symbols of the module) at n gaps, each of shape (n,)."""
 
-    pull: FloatArray  #: P, N
-    normal: FloatArray  #: N, N s/m
-    sliding: FloatArray  #: S, N s/m
-    coupling: FloatArray  #: C, N s
-    rolling: FloatArray  #: Q, N m s
+    pull: FloatArray
+    """Capillary force P, N."""
+    normal: FloatArray
+    """Resistance N to normal motion, N s/m."""
+    sliding: FloatArray
+    """Resistance S to sliding, N s/m."""
+    coupling: FloatArray
+    """Coupling C of sliding and rolling, N s."""
+    rolling: FloatArray
+    """Resistance Q to rolling, N m s."""
 
     def columns(self) -> FloatArray:
-        """Shape (N, 5), in the order of the attributes."""
-        return np.stack(list(vars(self).values()), axis=-1)
+        """The quantities P, N, S, C and Q as columns, shape (n, 5)."""
+        return np.stack(
+            [self.pull, self.normal, self.sliding, self.coupling, self.rolling], axis=-1
+        )
 
 
 @dataclass(frozen=True)
 class Curve:
-    """The law for two given surfaces; raises `UnusableLawError` if its gaps are none."""
+    """The law of a bridge between two given surfaces.
 
-    forces: Callable[[FloatArray], Forces]  #: at gaps from 0 to ``rupture``, m
-    rupture: float  #: gap at which the bridge breaks, m
-    formation: float = 0.0  #: gap below which it forms, m; 0: the surfaces must touch
-    scale: float = 0.0  #: gap over which forces vary near contact, where a kink may be, m; 0: `Surfaces.roughness`
-    pull: Callable[[FloatArray], FloatArray] | None = (
-        None  #: alone, N, if resistances are expensive to compute
-    )
+    Raises
+    ------
+    UnusableLawError
+        If a gap is not a number, or if the gaps are not in the order 0 ≤ ``formation`` ≤
+        ``rupture``.
+    """
+
+    forces: Callable[[FloatArray], Forces]
+    """Function of gaps from 0 to ``rupture`` (m), shape (n,)."""
+    rupture: float
+    """Gap at which the bridge breaks, m."""
+    formation: float = 0.0
+    """Gap below which the bridge forms, m; 0 if the surfaces must touch."""
+    scale: float = 0.0
+    """Gap over which forces vary near contact, where a kink may be, m; 0 for
+    `Surfaces.roughness`."""
+    pull: Callable[[FloatArray], FloatArray] | None = None
+    """The capillary force alone, N, for laws whose resistances are expensive to compute."""
 
     def __post_init__(self) -> None:
-        """Refuse gaps that are not in their order."""
+        """Check the gaps."""
         if not 0.0 < self.rupture < inf:
             raise UnusableLawError(
                 f"the bridge breaks at a gap of {self.rupture:g} m; expected a positive number"
@@ -150,7 +202,26 @@ class Curve:
 
 
 def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
-    """Pull and resistances at gaps (m), shape (n, 5); raises `UnusableLawError` if they are unusable."""
+    """Compute capillary force and resistances of a bridge, and check them.
+
+    Parameters
+    ----------
+    curve
+        The law of the bridge.
+    gaps
+        Gaps from 0 to the rupture of the bridge, m, shape (n,).
+
+    Returns
+    -------
+    numpy.ndarray
+        P, N, S, C and Q, SI units, shape (n, 5).
+
+    Raises
+    ------
+    UnusableLawError
+        If a value is not a finite number, a resistance is negative, or sliding and rolling generate
+        energy (C² > S Q).
+    """
     with np.errstate(all="ignore"):
         forces = curve.forces(gaps)
     if not isinstance(forces, Forces):
@@ -158,27 +229,40 @@ def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
             f"its forces are {type(forces).__name__}; expected walkers.physics.bridge.Forces"
         )
     columns = np.empty((len(gaps), len(_COLUMNS)))
-    for number, (name, given) in enumerate(zip(_COLUMNS, vars(forces).values(), strict=True)):
-        column = np.asarray(given)
-        if column.dtype.kind not in "fiu" or column.shape not in ((), gaps.shape):
-            kind = f"type {column.dtype} and shape {column.shape}"
-            raise UnusableLawError(f"the {name} has {kind}; expected real numbers (n,)")
-        columns[:, number] = column
-        if not np.isfinite(column := columns[:, number]).all():
-            raise UnusableLawError(
-                f"the {name} is not a number at a gap of {gaps[~np.isfinite(column)][0]:g} m"
-            )
-        if name.endswith("resistance") and (column < 0.0).any():
-            raise UnusableLawError(
-                f"the {name} is negative at a gap of {gaps[column < 0.0][0]:g} m"
-            )
-    _, _, sliding, coupling, rolling = columns.T
-    gains = coupling**2 > (1.0 + 1e-9) * sliding * rolling
-    if gains.any():
-        why = "the square of the coupling exceeds the product of both resistances"
-        at = f"at a gap of {gaps[gains][0]:g} m"
-        raise UnusableLawError(f"sliding and rolling together generate energy {at}: {why}")
+    for number, (field, name) in enumerate(_COLUMNS.items()):
+        columns[:, number] = _checked(getattr(forces, field), name, gaps)
+    _, normal, sliding, coupling, rolling = columns.T
+    resistances = {"normal": normal, "sliding": sliding, "rolling": rolling}
+    for field, values in resistances.items():
+        negative = values < 0.0
+        if negative.any():
+            gap = gaps[negative][0]
+            raise UnusableLawError(f"the {_COLUMNS[field]} is negative at a gap of {gap:g} m")
+    generates = coupling**2 > (1.0 + 1e-9) * sliding * rolling
+    if generates.any():
+        gap = gaps[generates][0]
+        raise UnusableLawError(
+            f"sliding and rolling together generate energy at a gap of {gap:g} m: "
+            "the square of the coupling exceeds the product of both resistances"
+        )
     return columns
 
 
+def _checked(values: object, name: str, gaps: FloatArray) -> FloatArray:
+    """Values that a law gives at gaps, shape (n,); raises `UnusableLawError` if they are not finite
+    real numbers.
+    """
+    numbers = np.asarray(values)
+    if numbers.dtype.kind not in "fiu" or numbers.shape not in ((), gaps.shape):
+        form = f"type {numbers.dtype} and shape {numbers.shape}"
+        raise UnusableLawError(f"the {name} has {form}; expected real numbers (n,)")
+    column = np.empty(len(gaps))
+    column[:] = numbers
+    unknown = ~np.isfinite(column)
+    if unknown.any():
+        raise UnusableLawError(f"the {name} is not a number at a gap of {gaps[unknown][0]:g} m")
+    return column
+
+
 BridgeLaw = Callable[[Surfaces], Curve]
+"""A law: the curve of the bridge between two surfaces."""

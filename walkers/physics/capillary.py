@@ -2,8 +2,9 @@
 
 References
 ----------
-D. Shi, J. J. McCarthy, Powder Technology 184 (2008) 65–75 (volumes).
-G. Lian, C. Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138–147, doi 10.1006/jcis.1993.1452 (rupture).
+---------- D. Shi, J. J. McCarthy, Powder Technology 184 (2008) 65–75 (volumes). G. Lian, C.
+Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138–147, doi 10.1006/jcis.1993.1452
+(rupture).
 """
 
 from __future__ import annotations
@@ -21,17 +22,32 @@ if TYPE_CHECKING:
     from walkers.arrays import FloatArray
 
 DEFAULT_LAW = "young-laplace"
+"""Name of the bridge law of a case that names none."""
 _AIR_PRESSURE = 101_325.0
 """Standard atmosphere, Pa."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BridgeLiquid:
-    """Numbers of the liquid of bridges, SI units; ``law`` is the name of their law (`walkers.physics.laws`).
+    """The liquid of bridges.
 
-    ``viscosity`` belongs to the bridges; ``volume_fraction`` is the liquid on a bead over the volume of the bead.
-    If ``meniscus_radius`` (m) is not zero, it gives the volumes of bridges instead (`bridge_volume`).
-    Bridges take ``conserved`` liquid from the films of their beads.
+    Attributes
+    ----------
+    surface_tension
+        In N/m.
+    viscosity
+        Dynamic viscosity of the bridges, Pa s.
+    contact_angle
+        In rad.
+    volume_fraction
+        Volume of the liquid on a bead over the volume of the bead.
+    meniscus_radius
+        If it is not zero, it gives the volumes of bridges instead of ``volume_fraction``
+        (`bridge_volume`), m.
+    conserved
+        Whether bridges take their liquid from the films of their beads.
+    law
+        Name of the bridge law (`walkers.physics.laws`).
     """
 
     surface_tension: float
@@ -44,34 +60,59 @@ class BridgeLiquid:
 
 
 def derjaguin_radius(radius_1: float, radius_2: float) -> float:
-    """Derjaguin radius 2 R1 R2 / (R1 + R2): radius of equal spheres with the same gap profile; plane: infinity."""
+    """Derjaguin radius 2 R1 R2 / (R1 + R2): radius of equal spheres with the same gap profile;
+    plane: infinity.
+    """
     return 2.0 / (1.0 / radius_1 + 1.0 / radius_2)
 
 
 @lru_cache(maxsize=4096)
 def bridge_volume(radius: float, other_radius: float, liquid: BridgeLiquid) -> float:
-    """Volume of a bridge of a bead to a bead or a plane (infinite radius), m³; raises `ValueError` if there is none.
+    """Volume of a bridge of a bead to a bead or a plane, m³.
 
-    Both surfaces contribute to it (`share_of_bead`). Beads on a wetted plate exchange liquid through its film instead,
-    until all menisci have the suction γ/r of one ``meniscus_radius`` r: the touching bridge with this suction has
-    the volume, by the Young–Laplace equation.
+    Both surfaces contribute to it (`share_of_bead`). Beads on a wetted substrate exchange liquid
+    through its film instead, until all menisci have the suction γ/r of one ``meniscus_radius`` r.
+    The volume is then that of the bridge between touching surfaces that has this suction by the
+    Young–Laplace equation.
+
+    Parameters
+    ----------
+    radius, other_radius
+        Radii of the surfaces in any order, m; infinite for a plane.
+    liquid
+        The liquid of the bridge.
+
+    Raises
+    ------
+    ValueError
+        If no bridge has the suction.
     """
     if liquid.meniscus_radius:
-        shape = (*sorted((radius, other_radius)), liquid.contact_angle, liquid.meniscus_radius)
-        place = place_of_numbers("menisci", solver() + repr(shape).encode())
-        return float(kept_numbers(place, lambda: _volume_by_suction(*shape))[0])
+        small, large = sorted((radius, other_radius))
+        return _volume_by_suction(small, large, liquid.contact_angle, liquid.meniscus_radius)
     fraction = liquid.volume_fraction
-    return share_of_bead(radius, other_radius, fraction) + share_of_bead(
-        other_radius, radius, fraction
-    )
+    share = share_of_bead(radius, other_radius, fraction)
+    other_share = share_of_bead(other_radius, radius, fraction)
+    return share + other_share
 
 
-def _volume_by_suction(*shape: float) -> FloatArray:
-    import numpy as np
+def _volume_by_suction(
+    radius: float, other_radius: float, contact_angle: float, meniscus_radius: float
+) -> float:
+    """Volume (m³) of a bridge between touching surfaces with the suction γ/``meniscus_radius``,
+    from the cache.
+    """
+    bridge = (radius, other_radius, contact_angle, meniscus_radius)
 
-    from walkers.physics.laplace import volume_at_contact  # which imports scipy
+    def compute() -> FloatArray:
+        import numpy as np
 
-    return np.array([volume_at_contact(*shape)])
+        from walkers.physics.laplace import volume_at_contact  # which imports scipy
+
+        return np.array([volume_at_contact(*bridge)])
+
+    place = place_of_numbers("menisci", solver() + repr(bridge).encode())
+    return float(kept_numbers(place, compute)[0])
 
 
 @cache
@@ -82,29 +123,48 @@ def solver() -> bytes:
 
 
 def cavitation_gap(liquid: BridgeLiquid) -> float:
-    """Gap 2γ cos θ/p in which a meniscus has the suction p of the air's pressure, m (`walkers.physics.reynolds`)."""
+    """Gap 2γ cos θ/p in which the suction of a meniscus is the pressure p of the air, m
+    (`walkers.physics.reynolds`).
+    """
     return 2.0 * liquid.surface_tension * float(cosine(liquid.contact_angle)) / _AIR_PRESSURE
 
 
 def largest_normal(reduced_radius: float, roughness: float, liquid: BridgeLiquid) -> float:
-    """Upper bound of a bridge's N, for much liquid between touching surfaces, N s/m; radius and roughness in m."""
+    """Upper bound of a bridge's normal resistance N, for much liquid between touching surfaces, N
+    s/m.
+
+    Parameters
+    ----------
+    reduced_radius
+        R1 R2/(R1 + R2) of the surfaces, m.
+    roughness
+        Gap between surfaces that touch at their asperities, m.
+    liquid
+        The liquid of the bridge.
+    """
     return 6.0 * pi * liquid.viscosity * reduced_radius**2 / (roughness + cavitation_gap(liquid))
 
 
 def share_of_bead(radius: float, other_radius: float, volume_fraction: float) -> float:
-    """Volume that a bead gives to its bridge, m³: radii in m (infinite: a plane), volume of its liquid over its own.
+    """Volume that a bead gives to its bridge, m³.
 
-    A bead gives half of its film in the cap that another bead covers (Shi and McCarthy 2008), half of its film at a
-    plane. A plane gives nothing.
+    A bead gives half of its film in the cap that another bead covers (Shi and McCarthy 2008), and
+    half of its film at a plane. A plane gives nothing.
+
+    Parameters
+    ----------
+    radius, other_radius
+        Radii of the bead and of the surface at the other end of the bridge, m; infinite for a
+        plane.
+    volume_fraction
+        Volume of the liquid on the bead over the volume of the bead.
     """
     if radius == inf:
         return 0.0
-    cap = (
-        1.0
-        if other_radius == inf
-        else 1.0 - sqrt(1.0 - (other_radius / (radius + other_radius)) ** 2)
-    )
-    return 0.5 * film_volume(radius, volume_fraction) * cap
+    covered = 1.0
+    if other_radius != inf:
+        covered = 1.0 - sqrt(1.0 - (other_radius / (radius + other_radius)) ** 2)
+    return 0.5 * film_volume(radius, volume_fraction) * covered
 
 
 def film_volume(radius: float, volume_fraction: float) -> float:
@@ -118,10 +178,13 @@ def bead_volume(radius: float) -> float:
 
 
 def capillary_force_limit_at_wall(surface_tension: float, radius: float) -> float:
-    """Attraction of a sphere and a plane at perfect wetting, limit of small volume, 4πγR, N (McFarlane, Tabor 1950)."""
+    """Capillary force 4πγR (N) between a sphere and a plane for perfect wetting and small volumes.
+
+    Source: McFarlane and Tabor (1950).
+    """
     return 4.0 * pi * surface_tension * radius
 
 
-def rupture_distance(volume: float, contact_angle: float) -> float:
+def rupture_distance_of_lian(volume: float, contact_angle: float) -> float:
     """Gap at which a bridge breaks, (1 + θ/2) V^(1/3), m (Lian et al. 1993)."""
     return (1.0 + 0.5 * contact_angle) * cube_root(volume)

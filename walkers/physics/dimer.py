@@ -9,10 +9,19 @@ from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
 
 @dataclass(frozen=True)
 class Dimer:
-    """Derived quantities of the two beads of a case: symbols of the paper, SI units.
+    """The two beads of a walker, and what follows from them in the symbols of the paper.
 
-    Bead 1 is the first bead of the case. Khan et al.: sin δ = (R1 − R2)/(R1 + R2), μ = (m1 − m2)/M, R̄ = (R1 + R2)/2,
-    Γ0 = a0 M/(4πγR̄) (their Eq. 1).
+    Bead 1 is the first bead of the case. Khan et al.: sin δ = (R1 − R2)/(R1 + R2), μ = (m1 − m2)/M,
+    R̄ = (R1 + R2)/2, Γ0 = a0 M/(4πγR̄) (their Eq. 1).
+
+    Attributes
+    ----------
+    radii
+        R1 and R2, m.
+    density
+        Density of both beads, kg/m³.
+    surface_tension
+        γ of the liquid, N/m.
     """
 
     radii: tuple[float, float]

@@ -2,13 +2,13 @@
 
 NumPy, its BLAS and the C library choose among several versions of sin, exp, pow or a matrix product
 when a program starts, according to the vector instructions of the processor. The versions agree to
-15 digits, not to the last one. A bridge table that differs in its last digit gives another pile: piles
-are chaotic, and a run must not depend on where it was made.
+15 digits, not to the last one. A bridge table that differs in its last digit gives another pile:
+piles are chaotic, and a run must not depend on where it was made.
 
 The functions here consist of additions, multiplications, divisions, square roots and exact steps
-(rounding to integers, powers of two) of double-precision numbers. IEEE 754 defines the result of each
-of them, and NumPy applies them element by element in all its versions. Coefficients are those of
-FDLIBM; results are within two units in the last place.
+(rounding to integers, powers of two) of double-precision numbers. IEEE 754 defines the result of
+each of them, and NumPy applies them element by element in all its versions. Coefficients are those
+of FDLIBM; results are within two units in the last place.
 
 Not for general use: the functions are several times slower than NumPy's, and arguments are those of
 bridges (angles up to 1e5, finite numbers).
@@ -29,6 +29,7 @@ import numpy.typing as npt
 from walkers.arrays import FloatArray
 
 _QUARTERS_PER_RADIAN = 6.36619772367581382433e-01
+"""2/π."""
 _QUARTER_HIGH = 1.57079632673412561417e00
 """The first 33 bits of π/2, so that its products with small integers are exact."""
 _QUARTER_LOW = 6.07710050650619224932e-11
@@ -41,6 +42,7 @@ _SINE = (
     8.33333333332248946124e-03,
     -1.66666666666666324348e-01,
 )
+"""Coefficients of (sin x - x)/x³ in x²."""
 _COSINE = (
     -1.13596475577881948265e-11,
     2.08757232129817482790e-09,
@@ -49,8 +51,11 @@ _COSINE = (
     -1.38888888888741095749e-03,
     4.16666666666666019037e-02,
 )
+"""Coefficients of (cos x - 1 + x²/2)/x⁴ in x²."""
 _LOG_2_HIGH = 6.93147180369123816490e-01
+"""The first 32 bits of ln 2, so that its products with small integers are exact."""
 _LOG_2_LOW = 1.90821492927058770002e-10
+"""ln 2 minus `_LOG_2_HIGH`."""
 _LOGARITHM = (
     1.479819860511658591e-01,
     1.531383769920937332e-01,
@@ -60,6 +65,7 @@ _LOGARITHM = (
     3.999999999940941908e-01,
     6.666666666666735130e-01,
 )
+"""Coefficients of the series of ln((1 + r)/(1 - r)) in r²."""
 _EXPONENTIAL = (
     4.13813679705723846039e-08,
     -1.65339022054652515390e-06,
@@ -67,7 +73,9 @@ _EXPONENTIAL = (
     -2.77777777770155933842e-03,
     1.66666666666666019037e-01,
 )
+"""Coefficients of the rational approximation of exp x in x²."""
 _SQRT_HALF = 0.7071067811865476
+"""√(1/2)."""
 
 
 def polynomial(coefficients: Sequence[float], x: FloatArray) -> FloatArray:
@@ -90,9 +98,9 @@ def sine_and_cosine(angles: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     swapped = (quadrant == 1.0) | (quadrant == 3.0)
     sine_sign = np.where(quadrant >= 2.0, -1.0, 1.0)
     cosine_sign = np.where((quadrant == 1.0) | (quadrant == 2.0), -1.0, 1.0)
-    return sine_sign * np.where(swapped, cosine, sine), cosine_sign * np.where(
-        swapped, sine, cosine
-    )
+    sine_of_quadrant = np.where(swapped, cosine, sine)
+    cosine_of_quadrant = np.where(swapped, sine, cosine)
+    return sine_sign * sine_of_quadrant, cosine_sign * cosine_of_quadrant
 
 
 def sine(angles: npt.ArrayLike) -> FloatArray:
@@ -131,7 +139,8 @@ def exponential(x: npt.ArrayLike) -> FloatArray:
     """Exponential of numbers x, for |x| below 700."""
     given = np.asarray(x, np.float64)
     twos = np.rint(given / (_LOG_2_HIGH + _LOG_2_LOW))
-    high, low = given - twos * _LOG_2_HIGH, twos * _LOG_2_LOW
+    high = given - twos * _LOG_2_HIGH
+    low = twos * _LOG_2_LOW
     rest = high - low
     square = rest * rest
     c = rest - square * polynomial(_EXPONENTIAL, square)
@@ -140,7 +149,9 @@ def exponential(x: npt.ArrayLike) -> FloatArray:
 
 
 def power(x: npt.ArrayLike, exponent: float) -> FloatArray:
-    """Numbers x ≥ 0 to a positive power, or positive ones to any; relative error 1e-16 (1 + 2 |exponent ln x|)."""
+    """Numbers x ≥ 0 to a positive power, or positive ones to any; relative error 1e-16 (1 + 2
+    |exponent ln x|).
+    """
     given = np.asarray(x, np.float64)
     zero = given == 0.0
     return np.where(zero, 0.0, exponential(exponent * logarithm(np.where(zero, 1.0, given))))
@@ -166,7 +177,8 @@ def solve_linear(matrices: FloatArray, right: FloatArray) -> FloatArray:
         Solutions; not finite, or very large, where a matrix is singular.
     """
     rows = np.concatenate([matrices, right[..., None]], axis=-1)
-    systems, size = np.arange(len(rows)), right.shape[1]
+    systems = np.arange(len(rows))
+    size = right.shape[1]
     with np.errstate(all="ignore"):
         for column in range(size):
             pivot = column + np.abs(rows[:, column:, column]).argmax(axis=1)
@@ -184,7 +196,8 @@ def gauss_legendre(count: int) -> tuple[FloatArray, FloatArray]:
     numbers = np.arange(count)[::-1]
     nodes = cosine(np.pi * (numbers + 0.75) / (count + 0.5))
     for _ in range(8):  # Newton's method converges quadratically; the last steps change nothing
-        before, value = np.ones(count), nodes
+        before = np.ones(count)
+        value = nodes
         for degree in range(2, count + 1):
             following = ((2.0 * degree - 1.0) * nodes * value - (degree - 1.0) * before) / degree
             before, value = value, following
@@ -194,7 +207,9 @@ def gauss_legendre(count: int) -> tuple[FloatArray, FloatArray]:
 
 
 def chebyshev_coefficients(values: FloatArray) -> FloatArray:
-    """Coefficients of the polynomial through values at `chebyshev_nodes`, as of `numpy.polynomial.Chebyshev`."""
+    """Coefficients of the polynomial through values at `chebyshev_nodes`, as of
+    `numpy.polynomial.Chebyshev`.
+    """
     count = len(values)
     degrees = np.arange(count)[:, None]
     places = (np.arange(count) + 0.5)[None, :]

@@ -88,7 +88,7 @@ def predicted_overhead(cases: Iterable[Case]) -> float:
         if liquid.law.startswith("young-laplace")
         for place, radius in enumerate(radii)
         for second in (inf, *radii[place:])
-        for bridge in Surfaces.of(radius, second, liquid, roughness).volumes
+        for bridge in Surfaces.between(radius, second, liquid, roughness).volumes
     ]
     places = sum(
         case.count * case.run.attempts[0] / case.run.cycles_per_sample * case.run.samples_per_cycle

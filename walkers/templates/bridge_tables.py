@@ -139,7 +139,7 @@ def bridge_tables(
                 (len(surfaces) + 1, inf),
                 *((kind, size) for size in radii[number:]),
             ]:
-                for meeting in Surfaces.of(radius, other_radius, liquid, contact.roughness).volumes:
+                for meeting in Surfaces.between(radius, other_radius, liquid, contact.roughness).volumes:
                     parts.append(
                         f'# law "{liquid.law}"\nbridge {kind} {other_kind} {radius!r} {other_radius!r}\n'
                     )

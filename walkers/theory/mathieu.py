@@ -230,7 +230,10 @@ def _resistance_to_rolling(case: Case, axial: _AxialMotion) -> FloatArray:
     radii = np.array([*dimer.radii, dimer.reduced_radius])[:, None]
     first_spin, second_spin = axial.spin
     spins = np.array([first_spin, second_spin, first_spin - second_spin])
-    return case.contact.rolling_friction * axial.normal * radii / np.hypot(spins, speed / radii)
+    resistance: FloatArray = (
+        case.contact.rolling_friction * axial.normal * radii / np.hypot(spins, speed / radii)
+    )
+    return resistance
 
 
 def _sideways_slopes(
@@ -280,7 +283,9 @@ def _sideways_slopes(
         sliding[bead, :, 3 + bead] = radii[bead]
         rolling[bead, :, 3 + bead] = 1.0
     sliding[2, :, 0] = sine * (radii @ axial.spin)
-    sliding[2, :, 1:] = [1.0, -1.0, *(radii * sine), *(-radii * cosine)]
+    sliding[2, :, 1:3] = [1.0, -1.0]
+    sliding[2, :, 3:5] = radii * sine
+    sliding[2, :, 5:7] = -radii * cosine
     rolling[2, :, 0] = sine * (first_spin - second_spin)
     rolling[2, :, 3:] = [sine, -sine, -cosine, cosine]
 

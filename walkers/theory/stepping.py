@@ -36,8 +36,16 @@ _SLIDING, _PARALLEL, _NORMAL, _MODE = range(4)
 
 The mode is 0 for a contact that sticks, and the sign of the sliding of others. The work array
 contains such a state, then a matrix (three rows) and a right side. """
-_COAST, _GAIN, _PRESS, _LIFT, _REST = 0, 3, 6, 9, 12
-"""First rows of the matrices P, G, D and B of a walker's table, and the row of F0."""
+_COAST = 0
+"""First row of the matrix P in a walker's table."""
+_GAIN = 3
+"""First row of G."""
+_PRESS = 6
+"""First row of D."""
+_LIFT = 9
+"""First row of B."""
+_REST = 12
+"""Row of F0."""
 _REPEATED = 1e-6
 """m/s; cycles repeat if their mean sliding velocities differ by less than this."""
 _FAST = 3e-3
@@ -104,6 +112,7 @@ def integrate(  # noqa: PLR0913, PLR0917
     series = np.zeros((count, steps, 3))
     work = np.zeros((8, 3))
     first_later_cycle = cycles // 2
+    whole_step = np.int64(0)  # for a literal 0, numba compiles a version that its cache cannot load
     for walker in range(count):
         state = np.zeros((4, 3))
         totals = np.full((2, 3), np.inf)  # mean sliding velocities, smallest normal forces
@@ -116,7 +125,7 @@ def integrate(  # noqa: PLR0913, PLR0917
             totals[0] = 0.0
             totals[1] = np.inf
             for step in range(steps):
-                solved[walker] = _advance(
+                if not _advance(
                     tables[walker],
                     mu[walker],
                     drive[walker],
@@ -124,12 +133,12 @@ def integrate(  # noqa: PLR0913, PLR0917
                     parameters[walker],
                     step / steps,
                     1.0 / steps,
-                    0,
+                    whole_step,
                     state,
                     totals,
                     work,
-                )
-                if not solved[walker]:
+                ):
+                    solved[walker] = False
                     break
                 series[walker, step] = state[_SLIDING]
             if not solved[walker]:
@@ -185,7 +194,7 @@ def _advance(  # noqa: PLR0913, PLR0917
     if level < LEVELS - 1 and (not solved or (after[_MODE] != state[_MODE]).any()):
         part = length / FINER
         for number in range(FINER):
-            part_solved = _advance(
+            if not _advance(
                 tables,
                 mu,
                 drive,
@@ -197,8 +206,7 @@ def _advance(  # noqa: PLR0913, PLR0917
                 state,
                 totals,
                 work,
-            )
-            if not part_solved:
+            ):
                 return False
         return True
     if solved:

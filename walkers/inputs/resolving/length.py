@@ -10,7 +10,7 @@ from walkers.inputs.origins import Source
 from walkers.inputs.tables.case import Setup
 from walkers.inputs.tables.drive import Excitation
 from walkers.inputs.tables.run import CONSTANT, RunSettings, RunTable, settling_of
-from walkers.physics.time_step import TimeStepLimits, fit_into_cycle, time_step_limits
+from walkers.physics.time_step import BridgedBead, TimeStepLimits, fit_into_cycle, time_step_limits
 from walkers.rounding import percent
 
 MOST_STEPS = 2**31 - 1
@@ -31,8 +31,9 @@ def limits_of(case: Setup) -> TimeStepLimits:
     contact, placed = case.contact, sorted(bead.radius for bead in case.placed)
     bridged = [entry for body in case.bodies for entry in body.bridged]
     bridged += [(placed[-1], placed[:1]), (placed[0], placed[-1:])] if placed else []
+    damping = case.boundary.geometry.damping
     return time_step_limits(
-        [(*entry, case.boundary.geometry.damping(entry[0])) for entry in bridged],
+        [BridgedBead(radius, neighbours, damping(radius)) for radius, neighbours in bridged],
         density=case.beads.density,
         youngs_modulus=contact.youngs_modulus,
         poissons_ratio=contact.poissons_ratio,

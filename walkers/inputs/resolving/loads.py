@@ -42,7 +42,7 @@ def bridge_at_rest(case: Setup, radius: float, other_radius: float) -> Load:
 
 def surfaces_of(case: Setup, radius: float, other_radius: float) -> Surfaces:
     """A bead of a case and another bead or a plane (a radius of infinity), with a bridge between them; radii in m."""
-    return Surfaces.of(radius, other_radius, case.liquid.of_bridges, case.contact.roughness)
+    return Surfaces.between(radius, other_radius, case.liquid.of_bridges, case.contact.roughness)
 
 
 @lru_cache(maxsize=1024)  # points of a sweep have the same few bridges

@@ -1,7 +1,7 @@
 """The built-in laws of liquid bridges.
 
-A law is a function `Surfaces → Curve` (`walkers.physics.bridge`). A built-in law is the function ``law`` of a file in
-this folder, with its equation and source, and has the name of the file.
+A law is a function `Surfaces → Curve` (`walkers.physics.bridge`). A built-in law is the function
+``law`` of a file in this folder, with its equation and source, and has the name of the file.
 """
 
 from __future__ import annotations

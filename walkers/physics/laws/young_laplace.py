@@ -1,10 +1,12 @@
-"""The Young–Laplace equation, solved numerically: force and rupture distance, with Reynolds' resistances.
+"""The Young–Laplace equation, solved numerically: force and rupture distance, with Reynolds'
+resistances.
 
-The pull between beads and at a plane is the closed solution of `walkers.physics.laplace` for the given volume and
-contact angle. The bridge breaks at the largest gap at which the equation has a solution. Near rupture, the pull falls
-as the square root of the remaining gap, with an infinite slope. It is smooth in t = √(1 - h/rupture), and a polynomial
-in t through a few dozen solutions is as accurate as the equation. The user's cache keeps the polynomial of each shape
-of bridge, which saves a tenth of a second.
+The capillary force between beads and at a plane is the closed solution of `walkers.physics.laplace`
+for the given volume and contact angle. The bridge breaks at the largest gap at which the equation
+has a solution. Near rupture, the pull falls as the square root of the remaining gap, with an
+infinite slope. It is smooth in t = √(1 - h/rupture), and a polynomial in t through a few dozen
+solutions is as accurate as the equation. The user's cache keeps the polynomial of each shape of
+bridge, which saves a tenth of a second.
 
 `walkers.physics.reynolds` gives the resistances.
 """
@@ -26,9 +28,12 @@ from walkers.physics.capillary import solver
 from walkers.physics.portable import chebyshev_coefficients, chebyshev_nodes
 
 NODES = (48, 96)
-"""Numbers of gaps at which the equation is solved, increased until the last coefficients are small; the largest one
-suffices for errors below 1e-7 of the pull at contact at volumes above 1e-6 R³."""
+"""Numbers of gaps at which the equation is solved, increased until the last coefficients are small.
+
+The largest one suffices for errors below 1e-7 of the force at contact at volumes above 1e-6 R³.
+"""
 _Shape = tuple[float, float, float]
+"""The other radius and the volume, in units of the bead's radius, and the contact angle (rad)."""
 _SMALL = 1e-9
 """Largest last coefficients of an accurate polynomial, relative to the pull at contact."""
 
@@ -36,7 +41,8 @@ _SMALL = 1e-9
 def law(surfaces: Surfaces) -> Curve:
     """Pull and rupture distance of the Young–Laplace equation, and Reynolds resistances.
 
-    Raises `walkers.physics.laplace.NoBridgeError` if the liquid is not held between them (a large contact angle).
+    Raises `walkers.physics.laplace.NoBridgeError` if the contact angle is so large that the liquid
+    is not held between the surfaces.
     """
     radius = surfaces.radius
     farthest, smooth = _solved(_shape(surfaces))
@@ -50,17 +56,23 @@ def law(surfaces: Surfaces) -> Curve:
 
 def unsolved(bridges: Iterable[Surfaces]) -> int:
     """Number of bridge shapes without a cached solution; each takes a tenth of a second."""
-    return sum(
-        not is_trusted(_place(shape)) for shape in {_shape(surfaces) for surfaces in bridges}
-    )
+    shapes = {_shape(surfaces) for surfaces in bridges}
+    return sum(not is_trusted(_place(shape)) for shape in shapes)
 
 
 def _shape(surfaces: Surfaces) -> _Shape:
-    """The other radius and the volume in units of the bead's radius, and the contact angle."""
-    radius, angle = surfaces.radius, surfaces.liquid.contact_angle
-    numbers = (surfaces.other_radius / radius, surfaces.volume / (radius * radius * radius), angle)
-    other_radius, volume, angle = (float(f"{number:.14g}") for number in numbers)
-    return other_radius, volume, angle
+    """The shape of a bridge, rounded so that bridges of equal shape share a solution."""
+    radius = surfaces.radius
+    return (
+        _rounded(surfaces.other_radius / radius),
+        _rounded(surfaces.volume / (radius * radius * radius)),
+        _rounded(surfaces.liquid.contact_angle),
+    )
+
+
+def _rounded(number: float) -> float:
+    """A number with 14 significant digits."""
+    return float(f"{number:.14g}")
 
 
 def _place(shape: _Shape) -> Path:
@@ -70,7 +82,9 @@ def _place(shape: _Shape) -> Path:
 
 @lru_cache(maxsize=4096)
 def _solved(shape: _Shape) -> tuple[float, Chebyshev]:
-    """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's radius."""
+    """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's
+    radius.
+    """
     numbers = kept_numbers(_place(shape), lambda: _solve(shape))
     return float(numbers[0]), Chebyshev(numbers[1:], domain=[0.0, 1.0])
 
