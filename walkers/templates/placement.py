@@ -135,7 +135,7 @@ def _room(
     largest = max(max(case.radii) for case in cases)
     amplitude = max(case.excitation.farthest for case in cases)
     placed = [bead.at for case in cases for bead in case.placed]
-    return cases[0].boundary.geometry.room(
+    return cases[0].boundary.geometry.simulation_box(
         half_x=max([x for x, _ in grid] + [abs(x) for x, _, _ in placed], default=0.0) + far,
         half_y=max([y for _, y in grid] + [abs(y) for _, y, _ in placed], default=0.0) + far,
         height=10.0 * largest

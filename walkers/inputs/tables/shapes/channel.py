@@ -32,7 +32,7 @@ class ChannelShape(Shape):
         """See `Shape.damping`; a bead as wide as the channel touches both walls."""
         return damping_between(self.width, radius)
 
-    def room(
+    def simulation_box(
         self,
         half_x: float,
         half_y: float,
@@ -40,7 +40,7 @@ class ChannelShape(Shape):
         margin: float,
         largest: float,
     ) -> tuple[Vector, Vector]:
-        """The simulation box (see `Shape.room`), as wide as the channel and at least as high."""
-        (x, _, below), (_, _, top) = super().room(half_x, half_y, height, margin, largest)
+        """The simulation box (see `Shape.simulation_box`), as wide as the channel and at least as high."""
+        (x, _, below), (_, _, top) = super().simulation_box(half_x, half_y, height, margin, largest)
         y = self.width / 2.0 + margin
         return (x, -y, below), (-x, y, max(top, self.width))

@@ -49,7 +49,7 @@ class Container(Shape):
         """See `Shape.damping`; a bead as wide as the container touches two opposite sides."""
         return damping_between(self.width, radius)
 
-    def room(
+    def simulation_box(
         self,
         half_x: float,  # noqa: ARG002
         half_y: float,  # noqa: ARG002
@@ -57,7 +57,7 @@ class Container(Shape):
         margin: float,  # noqa: ARG002
         largest: float,
     ) -> tuple[Vector, Vector]:
-        """The simulation box (see `Shape.room`): the container and as much room above it."""
+        """The simulation box (see `Shape.simulation_box`): the container and as much room above it."""
         half = self.width / 2.0 + _RIM
         return (-half, -half, -4.0 * largest), (half, half, 2.0 * self.height)
 

@@ -22,7 +22,7 @@ class PlaneShape(Shape):
         """The floor."""
         return (BOTTOM,)
 
-    def room(
+    def simulation_box(
         self,
         half_x: float,
         half_y: float,
@@ -30,6 +30,6 @@ class PlaneShape(Shape):
         margin: float,
         largest: float,
     ) -> tuple[Vector, Vector]:
-        """The simulation box (see `Shape.room`), which reaches one margin below the floor."""
-        (x, y, _), high = super().room(half_x, half_y, height, margin, largest)
+        """The simulation box (see `Shape.simulation_box`), which reaches one margin below the floor."""
+        (x, y, _), high = super().simulation_box(half_x, half_y, height, margin, largest)
         return (x, y, -margin), high

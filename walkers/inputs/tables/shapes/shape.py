@@ -126,7 +126,7 @@ class Shape(ABC):
             places.append((x, y))
         return places
 
-    def room(
+    def simulation_box(
         self,
         half_x: float,
         half_y: float,
