@@ -142,7 +142,7 @@ class Boundary(ConfigTable):
 
 @lru_cache(maxsize=16)  # the surface of a mesh takes seconds
 def _geometry_of(boundary: Boundary) -> Shape:
-    return SHAPES[boundary.shape].of(boundary)
+    return SHAPES[boundary.shape].from_table(boundary)
 
 
 def _round(value: float) -> float:

@@ -66,7 +66,7 @@ class Shape(ABC):
     """Whether walkers stand one after the other along x."""
 
     @classmethod
-    def of(cls, table: object) -> Self:
+    def from_table(cls, table: object) -> Self:
         """The shape of a table with the keys of ``[boundary]``."""
         return cls(*(getattr(table, field.name) for field in fields(cls)))
 

@@ -48,11 +48,11 @@ class VesselShape(Container):
     triangles: tuple[tuple[int, int, int], ...]
 
     @classmethod
-    def of(cls, table: Any) -> Self:
+    def from_table(cls, table: Any) -> Self:
         """The vessel of a table with the keys of ``[boundary]``, of facets if it has triangles."""
         if table.triangles and cls is VesselShape:
-            return MeshVesselShape.of(table)  # type: ignore[return-value]
-        return super().of(table)
+            return MeshVesselShape.from_table(table)  # type: ignore[return-value]
+        return super().from_table(table)
 
     @cached_property
     def vessel(self) -> Vessel:
