@@ -201,7 +201,7 @@ def _check_places(cluster: WalkerGeometry, key: str) -> None:
         raise key_error(key, f"expected a place for each of the {len(everyone)} beads")
     if overlapping := touching(places, cluster.radii, -OVERLAP):
         first, second = overlapping[0]
-        distances = dist(places[first], places[second]), cluster.rigid(first, second)
+        distances = dist(places[first], places[second]), cluster.rigid_distance(first, second)
         raise key_error(f"{key}[{second}]", overlaps(f"{key}[{first}]", *distances))
     if not any(cluster.front):
         raise key_error(key, "expected some beads ahead of others: this walker has no heading")

@@ -144,9 +144,9 @@ class WalkerGeometry:
     @cached_property
     def design(self) -> Places:
         """Positions of rigid beads on a plane in the frame of the walker, m."""
-        return list(self.at) or ARRANGEMENTS[self.arrangement].places(self.radii, self.rigid)
+        return list(self.at) or ARRANGEMENTS[self.arrangement].places(self.radii, self.rigid_distance)
 
-    def rigid(self, bead: int, neighbour: int) -> float:
+    def rigid_distance(self, bead: int, neighbour: int) -> float:
         """Distance seen from above of two beads that touch each other and the floor without overlap, m."""
         first, second = self.radii[bead], self.radii[neighbour]
         return (first + second) * cos(asin((first - second) / (first + second)))
@@ -154,7 +154,7 @@ class WalkerGeometry:
     @cached_property
     def length(self) -> float:
         """Length of the walker seen from above, m."""
-        distances = {} if self.at else {pair: self.rigid(*pair) for pair in self.pairs}
+        distances = {} if self.at else {pair: self.rigid_distance(*pair) for pair in self.pairs}
         extents = []
         for first, second in combinations(range(len(self.radii)), 2):
             distance = distances.get((first, second), dist(self.design[first], self.design[second]))
