@@ -201,7 +201,7 @@ def compose(plan: Plan) -> Deck:
     scalable = len(surfaces) == 1 and liquid.law in LAWS and liquid.viscosity > 0.0
     files = {BRIDGES_NAME: _tables_of_scene(case, scene)}
     record = case.excitation.record
-    files |= case.excitation.courses()
+    files |= case.excitation.course_files()
     files |= {LOADS_NAME: _loads(scene)} if len(scene.loadings) > 1 else {}
     facets = "".join(wall.file_rows() for wall in scene.walls)
     if facets:

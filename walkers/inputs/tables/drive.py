@@ -387,7 +387,7 @@ class Excitation:
         (x, v, a), (factor, slope, bend) = course, (self.factor(time, order) for order in range(3))
         return factor * x, factor * v + slope * x, factor * a + 2.0 * slope * v + bend * x
 
-    def courses(self) -> dict[str, str]:
+    def course_files(self) -> dict[str, str]:
         """Names and contents of the files from which the engine reads a record and a ramp."""
         record = self.record
         files = {} if record is None else {
