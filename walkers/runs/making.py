@@ -305,7 +305,7 @@ class OpenRun:
             restart = new / decks.RESTART_NAME
             size = restart.stat().st_size if restart.exists() else 0
             if (
-                not self.case.run.in_one and size < _LEAST_BYTES * deck.layout.atoms
+                not self.case.run.has_one_segment and size < _LEAST_BYTES * deck.layout.atoms
             ):  # the engine does not check this
                 raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
             velocities = _RMS_VELOCITY.findall((new / decks.OUTPUT_NAME).read_bytes())

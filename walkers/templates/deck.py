@@ -169,7 +169,7 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
         *(MEAN_SPIN_COLUMNS if walkers else ()),
         *([FILM_COLUMN] * case.liquid.conserved),
     ]
-    restart = None if run.in_one else RESTART_NAME
+    restart = None if run.has_one_segment else RESTART_NAME
     return Plan(
         case=case,
         scene=scene,

@@ -346,4 +346,4 @@ class Case(Setup):
     @property
     def independent(self) -> bool:
         """Whether its walkers are so wherever they stand, so that others' may stand beside them in a deck."""
-        return self.apart and self.run.in_one and self.boundary.bare
+        return self.apart and self.run.has_one_segment and self.boundary.bare

@@ -164,6 +164,6 @@ class RunSettings(RunTable):
         return bool(self.longest_settling)
 
     @property
-    def in_one(self) -> bool:
+    def has_one_segment(self) -> bool:
         """Whether the run has a single segment."""
         return not self.rests and self.cycles_per_segment >= self.cycles
