@@ -186,7 +186,7 @@ def test_cycles_of_records(tmp_path: Path) -> None:
     assert once.excitation.frequency == pytest.approx(
         74.4, rel=1e-3
     )  # a third of the way between two lines
-    assert once.excitation.cycles == (0.0, pytest.approx(0.2998 * 74.4, rel=1e-3))
+    assert once.excitation.cycle_limits == (0.0, pytest.approx(0.2998 * 74.4, rel=1e-3))
     # Left out, a run has all whole cycles of its record, or those of its ramp.
     ramped = changed_case(repeats, {"drive.ramp": RAMP})
     assert [load_case({**one.document, "run": {}}).run.cycles for one in (once, ramped)] == [22, 5]

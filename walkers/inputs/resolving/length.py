@@ -135,7 +135,7 @@ def cycles_of(table: RunTable, drive: Excitation, cycles_per_sample: int) -> int
     end of its ramp, to the last whole cycle of a record that does not repeat, or for 60 cycles. A
     duration within a record ends with the last whole cycle of the record at the latest.
     """
-    fewest, most = drive.cycles
+    fewest, most = drive.cycle_limits
     all_of_record = inf
     if drive.ends:
         all_of_record = floor((most + 1e-9) / cycles_per_sample) * cycles_per_sample
@@ -195,7 +195,7 @@ def _check_length(case: Setup, run: RunSettings, longest: float) -> None:
         run.settling_cycles,
         run.cycles_per_sample,
     )
-    (fewest, most), name = drive.cycles, "run.cycles" if run.duration is None else "run.duration"
+    (fewest, most), name = drive.cycle_limits, "run.cycles" if run.duration is None else "run.duration"
     if run.until and case.mixture is None:
         raise key_error(
             "run.until", "expected none: only clusters of a [mixture] climb out of a pile"

@@ -307,7 +307,7 @@ class Excitation:
         return max((factor for _, factor in self.ramp), default=1.0)
 
     @property
-    def cycles(self) -> tuple[float, float]:
+    def cycle_limits(self) -> tuple[float, float]:
         """Smallest and largest number of cycles of a run: to the end of the ramp, and of a record that ends.
 
         A ramp that ends with the record ends with its last whole cycle.
