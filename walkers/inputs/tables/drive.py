@@ -1,6 +1,8 @@
-"""Drive of the boundary: the table ``[drive]``, and the sum of sines A sin(2π f t + φ) that it stands for.
+"""Drive of the boundary: the table ``[drive]``, and the shaking that it stands for.
 
-The cycle of a drive is the common period of its sines; its peak acceleration, and Γ0, belong to the largest one.
+A drive is a sum of sines A sin(2π f t + φ), or a record. The cycle of a sum is the common period of
+its sines; its peak acceleration, and Γ0, belong to the largest sine. Files of records are read in
+`walkers.inputs.records`.
 """
 
 from __future__ import annotations
@@ -27,48 +29,85 @@ if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
 Frame = Literal["lab", "container"]
+"""Frame of reference of positions and velocities: the laboratory or the walls."""
 AXES: Mapping[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+"""Unit vectors of the axes by their names."""
 LARGEST_RATIO = 24
 """Largest integer in the ratio of two frequencies: 24/1 and 23/24 are accepted, 25/1 is not."""
-WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
-    "sine": ((1, 1.0),),
-    "triangle": tuple((k, 8.0 / pi**2 / k**2 * (-1.0) ** (k // 2)) for k in range(1, 10, 2)),
-    "sawtooth": tuple((k, 2.0 / pi / k * (-1.0) ** (k + 1)) for k in range(1, 10)),
-}
-"""Of the acceleration: multiples of the frequency and shares of the peak. A triangle's series is cut at 0.96 of it."""
-_LINE_ALONE = (
-    0.95  # share of the largest acceleration of a record below which its line is named beside it
-)
-_FEW = 3
-_FEW_ENOUGH = Field(max_length=24)
-_SAME_TIME = 1e-9  # relative error of times, and of numbers of cycles
 MOST_PERIODS = 1000
 """Largest number of periods of the fastest sine in a cycle."""
+_HIGHEST_MULTIPLE = 9
+"""Highest harmonic of the waveforms, in multiples of the frequency."""
+_DESCRIBED_HARMONICS = 3
+"""Largest number of harmonics that the description of a drive names one by one."""
+_LINE_SHARE = 0.95
+"""The description of a record names its strongest line if the amplitude of the line is below this
+share of the record's largest acceleration."""
+_TIME_TOLERANCE = 1e-9
+"""Relative tolerance of equal times, and tolerance of whole numbers of cycles."""
+_AT_MOST_24 = Field(max_length=24)
 
 
-def _axis(value: object) -> object:
-    """An axis by its name, or a direction by its components."""
+def _triangle() -> Iterator[tuple[int, float]]:
+    """The harmonics of a triangle, as in `WAVEFORMS`."""
+    for multiple in range(1, _HIGHEST_MULTIPLE + 1, 2):
+        yield multiple, 8.0 / pi**2 / multiple**2 * (-1.0) ** (multiple // 2)
+
+
+def _sawtooth() -> Iterator[tuple[int, float]]:
+    """The harmonics of a sawtooth, as in `WAVEFORMS`."""
+    for multiple in range(1, _HIGHEST_MULTIPLE + 1):
+        yield multiple, 2.0 / pi / multiple * (-1.0) ** (multiple + 1)
+
+
+WAVEFORMS: Mapping[str, tuple[tuple[int, float], ...]] = {
+    "sine": ((1, 1.0),),
+    "triangle": tuple(_triangle()),
+    "sawtooth": tuple(_sawtooth()),
+}
+"""Fourier series of the accelerations of waveforms, by name.
+
+Each harmonic has its multiple of the frequency and its share of the peak acceleration. The sum of
+the harmonics of a triangle, which end at the 9th, has 0.96 of the peak acceleration.
+"""
+
+
+def _is_direction(value: object) -> bool:
+    """Whether a value has three finite numbers as components, of which at least one is not zero."""
+    if not isinstance(value, (list, tuple)) or len(value) != 3 or not any(value):
+        return False
+    for component in value:
+        # A bool is an int to `isinstance`, but no component.
+        if type(component) not in (int, float) or not isfinite(component):
+            return False
+    return True
+
+
+def _read_axis(value: object) -> object:
+    """An axis by its name, or a direction by its components; other values raise `ValueError`."""
     if value in ("x", "y", "z"):
         return value
-    if isinstance(value, (list, tuple)) and len(value) == 3 and any(value):
-        numbers = tuple(float(x) for x in value if type(x) in (int, float) and isfinite(x))
-        if len(numbers) == 3:
-            return numbers
+    if isinstance(value, (list, tuple)) and _is_direction(value):
+        return tuple(float(component) for component in value)
     raise ValueError("expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]")
 
 
-_VECTOR = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
+_VECTOR_SCHEMA = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}
 _Direction = Annotated[
-    str | Vector, BeforeValidator(_axis), WithJsonSchema({"anyOf": [{"enum": list(AXES)}, _VECTOR]})
+    str | Vector,
+    BeforeValidator(_read_axis),
+    WithJsonSchema({"anyOf": [{"enum": list(AXES)}, _VECTOR_SCHEMA]}),
 ]
 _Recorded = Annotated[Any, BeforeValidator(record_of), WithJsonSchema({"type": "string"})]
 Ramp = tuple[tuple[float, float], ...]
+"""Times after the start of the drive, s, and factors of the displacement at them."""
 
 
 def _usable_ramp(ramp: Ramp) -> Ramp:
-    """A ramp whose times increase and whose factors are not all zero."""
-    if any(time >= later for (time, _), (later, _) in pairwise(ramp)):
-        raise ValueError("expected times that increase")
+    """The ramp; raises `ValueError` if its times do not increase or all its factors are zero."""
+    for (time, _), (later, _) in pairwise(ramp):
+        if time >= later:
+            raise ValueError("expected times that increase")
     if ramp and not any(factor for _, factor in ramp):
         raise ValueError("expected a factor above zero at some time")
     return ramp
@@ -82,7 +121,7 @@ _Factors = Annotated[
 
 
 class _SineTable(ConfigTable):
-    """A sine A sin(2π f t + φ) along a direction: its keys in ``[drive]`` and in ``[[drive.harmonics]]``."""
+    """A sine A sin(2π f t + φ) along a direction, as in ``[drive]`` and ``[[drive.harmonics]]``."""
 
     choices: ClassVar[tuple[Choice, ...]] = (Choice(("peak_acceleration",), ("gamma0",)),)
     axis: _Direction | None = key(
@@ -99,7 +138,10 @@ class _SineTable(ConfigTable):
 
 
 class HarmonicTable(_SineTable):
-    """One of ``[[drive.harmonics]]``: A sin(2π f t + φ) along a direction, frequency f, peak acceleration A (2πf)²."""
+    """One of ``[[drive.harmonics]]``: A sin(2π f t + φ) along a direction.
+
+    The frequency is f, the peak acceleration A (2πf)².
+    """
 
     frequency: units.Frequency = key("Frequency in cycles per second.")
 
@@ -113,7 +155,9 @@ class Harmonic(HarmonicTable):
     @property
     def direction(self) -> Vector:
         """Direction of the shaking, a unit vector."""
-        return AXES[self.axis] if isinstance(self.axis, str) else unit_vector(self.axis)
+        if isinstance(self.axis, str):
+            return AXES[self.axis]
+        return unit_vector(self.axis)
 
     @property
     def angular_frequency(self) -> float:
@@ -122,20 +166,21 @@ class Harmonic(HarmonicTable):
 
     @property
     def amplitude(self) -> float:
-        """A, m."""
+        """Displacement amplitude A, m."""
         return self.peak_acceleration / self.angular_frequency**2
 
     @property
     def peak_velocity(self) -> float:
-        """A 2πf, m/s."""
+        """Velocity amplitude 2πf A, m/s."""
         return self.peak_acceleration / self.angular_frequency
 
 
 class DriveTable(_SineTable):
-    """``[drive]``: one harmonic by its keys, or several as ``[[drive.harmonics]]``.
+    """``[drive]``: one harmonic by its keys, several as ``[[drive.harmonics]]``, or a record.
 
-    In the ``frame`` of the container, as is usual, the beads feel the inertial force; in the frame of the laboratory
-    the walls move, which they can for one harmonic without a phase, and for a record.
+    In the ``frame`` of the container, the default, the beads feel the inertial force. In the frame
+    of the laboratory the walls move, which is possible for a single harmonic without a phase and
+    for a record.
     """
 
     choices: ClassVar[tuple[Choice, ...]] = (
@@ -150,12 +195,14 @@ class DriveTable(_SineTable):
         "sine",
     )
     frame: Frame = key(
-        "`container`: the beads feel the inertial force. `lab`: the boundary moves. Velocities agree within 10⁻⁶.",
+        "`container`: the beads feel the inertial force. `lab`: the boundary moves. "
+        "Velocities agree within 10⁻⁶.",
         "container",
     )
-    harmonics: Annotated[tuple[HarmonicTable, ...], _FEW_ENOUGH] = key("Several harmonics.", ())
+    harmonics: Annotated[tuple[HarmonicTable, ...], _AT_MOST_24] = key("Several harmonics.", ())
     record: _Recorded | None = key(
-        "File with the acceleration of the boundary against time. See [](../cases.md#recorded-shaking).",
+        "File with the acceleration of the boundary against time. "
+        "See [](../cases.md#recorded-shaking).",
         None,
         "trace.csv",
     )
@@ -163,46 +210,46 @@ class DriveTable(_SineTable):
         "Whether the record is a period, which repeats. Default: false.", None
     )
     ramp: _Factors = key(
-        "Times after the start of the drive and factors of the displacement, which is linear in between.",
+        "Times after the start of the drive and factors of the displacement, "
+        "which is linear in between.",
         (),
         [["0 s", 1], ["2 s", 0.2]],
     )
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
-        """Keys of a single harmonic beside several, or contradictions and gaps as of every table."""
+        """Keys of a single harmonic beside several; without several, the problems of any table."""
         if not given.get("harmonics"):
             yield from super().problems(given, place)
             return
-        for name in sorted(given.keys() & {*HarmonicTable.model_fields, "waveform", "record"}):
-            instead = (
-                f": write {place}.harmonics[0].{name}" if name in HarmonicTable.model_fields else ""
-            )
-            yield Problem(
-                f"{place}.{name}", None, f"expected none beside {place}.harmonics{instead}"
-            )
+        excluded = {*HarmonicTable.model_fields, "waveform", "record"}
+        for name in sorted(given.keys() & excluded):
+            expected = f"expected none beside {place}.harmonics"
+            if name in HarmonicTable.model_fields:
+                expected = f"{expected}: write {place}.harmonics[0].{name}"
+            yield Problem(f"{place}.{name}", None, expected)
 
 
 class Drive(DriveTable):
-    """The drive of a resolved case: a record, several harmonics, or a single one by the keys of the table.
+    """The drive of a resolved case: a record, several harmonics, or a single one.
 
-    With a record or several harmonics, the keys of the single one have no values.
+    The keys of the table itself describe a single harmonic; with a record or several harmonics,
+    they have no values.
     """
 
-    harmonics: Annotated[tuple[Harmonic, ...], _FEW_ENOUGH]
+    harmonics: Annotated[tuple[Harmonic, ...], _AT_MOST_24]
 
     @cached_property
     def excitation(self) -> Excitation:
         """The sum of sines that the keys describe, or the record."""
         if self.record:
-            return Excitation(
-                (), self.frame, self.record.with_values(repeats=bool(self.repeats)), self.ramp
-            )
+            record = self.record.with_values(repeats=bool(self.repeats))
+            return Excitation(harmonics=(), frame=self.frame, record=record, ramp=self.ramp)
         if self.harmonics:
             harmonics = tuple(_sine(harmonic) for harmonic in self.harmonics)
         else:
             harmonics = waveform(self.waveform, _sine(self))
-        return Excitation(harmonics, self.frame, ramp=self.ramp)
+        return Excitation(harmonics=harmonics, frame=self.frame, ramp=self.ramp)
 
 
 def _sine(table: _SineTable) -> Harmonic:
@@ -217,7 +264,19 @@ def _sine(table: _SineTable) -> Harmonic:
 
 @dataclass(frozen=True)
 class Excitation:
-    """A sum of sines or a record, a ramp, and the frame: moving walls, or an inertial force on the beads."""
+    """The shaking of the boundary: a sum of sines or a record, times the factor of a ramp.
+
+    Attributes
+    ----------
+    harmonics : tuple of Harmonic
+        The sines; empty for a record.
+    frame : {"lab", "container"}
+        Whether the walls move, or an inertial force acts on the beads.
+    record : Record or None
+        The recorded shaking.
+    ramp : tuple of tuple
+        Times (s) after the start of the drive and factors of the displacement; empty for no ramp.
+    """
 
     harmonics: tuple[Harmonic, ...]
     frame: Frame
@@ -227,19 +286,24 @@ class Excitation:
     @property
     def largest(self) -> Harmonic:
         """The harmonic of the largest peak acceleration, the first of equal ones."""
-        return max(self.harmonics, key=lambda sine: sine.peak_acceleration)
+        return max(self.harmonics, key=lambda harmonic: harmonic.peak_acceleration)
 
     @property
     def direction(self) -> Vector:
         """Direction of the largest harmonic or of the record, a unit vector."""
-        return self.record.direction if self.record else self.largest.direction
+        if self.record:
+            return self.record.direction
+        return self.largest.direction
 
     @property
     def peak_acceleration(self) -> float:
-        """Peak acceleration of the largest harmonic or of the record at the ramp's largest factor, m/s²."""
-        return self.largest_factor * (
-            self.record.largest(2) if self.record else self.largest.peak_acceleration
-        )
+        """Peak acceleration of the largest harmonic or of the record, m/s².
+
+        It includes the largest factor of the ramp.
+        """
+        if self.record:
+            return self.largest_factor * self.record.largest(2)
+        return self.largest_factor * self.largest.peak_acceleration
 
     @property
     def is_plain(self) -> bool:
@@ -248,54 +312,73 @@ class Excitation:
 
     @property
     def frequency(self) -> float:
-        """Frequency of the cycle, the common period of the harmonics, Hz; raises `ValueError` if they have none."""
+        """Frequency of the cycle, Hz; harmonics without a common period raise `ValueError`."""
         if self.record:
             return self.record.frequencies[0]
-        return common_frequency([sine.frequency for sine in self.harmonics])
+        return common_frequency([harmonic.frequency for harmonic in self.harmonics])
 
     @property
     def fastest(self) -> float:
         """The highest frequency, Hz."""
-        return (
-            self.record.frequencies[1]
-            if self.record
-            else max(sine.frequency for sine in self.harmonics)
-        )
+        if self.record:
+            return self.record.frequencies[1]
+        return max(harmonic.frequency for harmonic in self.harmonics)
 
     @property
     def amplitude(self) -> float:
-        """Largest displacement that the harmonics could add up to, or of a record without its slow part, m."""
-        largest = (
-            self.record.largest(0)
-            if self.record
-            else sum(sine.amplitude for sine in self.harmonics)
-        )
-        return self.largest_factor * largest
+        """Largest displacement, m: an upper bound for several harmonics.
+
+        The displacement of a record is that without its slow part.
+        """
+        if self.record:
+            displacement = self.record.largest(0)
+        else:
+            displacement = sum(harmonic.amplitude for harmonic in self.harmonics)
+        return self.largest_factor * displacement
 
     @property
     def peak_velocity(self) -> float:
-        """Largest speed that the harmonics could add up to, or of a record without its slow part, m/s."""
-        largest = (
-            self.record.largest(1)
-            if self.record
-            else sum(sine.peak_velocity for sine in self.harmonics)
-        )
-        return self.largest_factor * largest
+        """Largest speed, m/s: an upper bound for several harmonics.
+
+        The speed of a record is that without its slow part.
+        """
+        if self.record:
+            speed = self.record.largest(1)
+        else:
+            speed = sum(harmonic.peak_velocity for harmonic in self.harmonics)
+        return self.largest_factor * speed
 
     @property
     def farthest(self) -> float:
-        """Largest displacement of the boundary in the frame ``lab``, with the slow part of a record, m."""
-        return self.largest_factor * self.record.farthest if self.record else self.amplitude
+        """Largest displacement of the boundary in the frame ``lab``, m.
+
+        It includes the slow part of a record.
+        """
+        if self.record:
+            return self.largest_factor * self.record.farthest
+        return self.amplitude
 
     @property
     def changes(self) -> bool:
-        """Whether the strength of the drive changes: by a ramp, or because a record is not stationary."""
+        """Whether the strength of the drive changes.
+
+        It changes by a ramp, or because a record is not stationary.
+        """
         return bool(self.ramp) or (self.record is not None and not self.record.is_stationary)
 
     def local_amplitude(self, time: FloatArray) -> FloatArray:
-        """Peak acceleration of the largest harmonic at times (s), m/s², shape (N,).
+        """Peak acceleration of the drive around given times.
 
-        This is its constant one times the factor of the ramp; of a record, `Record.local_amplitude` times the factor.
+        Parameters
+        ----------
+        time : ndarray, shape (N,)
+            Times after the start of the drive, s.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Peak acceleration of the largest harmonic, or `Record.local_amplitude` of a record,
+            times the factor of the ramp, m/s².
         """
         if self.record:
             return np.asarray(self.factor(time) * self.record.local_amplitude(time))
@@ -303,21 +386,25 @@ class Excitation:
 
     @property
     def largest_factor(self) -> float:
-        """Largest factor of the ramp."""
+        """Largest factor of the ramp; 1 without a ramp."""
         return max((factor for _, factor in self.ramp), default=1.0)
 
     @property
     def cycle_limits(self) -> tuple[float, float]:
-        """Smallest and largest number of cycles of a run: to the end of the ramp, and of a record that ends.
+        """Smallest and largest number of cycles of a run.
 
-        A ramp that ends with the record ends with its last whole cycle.
+        A run lasts at least to the end of the ramp, and at most to the end of a record that does
+        not repeat. If the ramp ends with the record, the last whole cycle of the record is enough.
         """
-        end = self.ramp[-1][0] if self.ramp else 0.0
-        fewest, most = end * self.frequency, inf
-        if self.ends:
-            most = self.length * self.frequency
-            if end <= self.length * (1.0 + _SAME_TIME):
-                fewest = min(fewest, floor(most + _SAME_TIME))
+        end_of_ramp = 0.0
+        if self.ramp:
+            end_of_ramp = self.ramp[-1][0]
+        fewest = end_of_ramp * self.frequency
+        if not self.ends:
+            return fewest, inf
+        most = self.length * self.frequency
+        if end_of_ramp <= self.length * (1.0 + _TIME_TOLERANCE):
+            fewest = min(fewest, floor(most + _TIME_TOLERANCE))
         return fewest, most
 
     @property
@@ -328,36 +415,55 @@ class Excitation:
     @property
     def length(self) -> float:
         """Length of a record that does not repeat, s; infinite for other drives."""
-        return self.record.length if self.record and self.ends else inf
+        if self.record and self.ends:
+            return self.record.length
+        return inf
 
     @cached_property
     def factor(self) -> PPoly:
-        """Factor of the ramp against time (s): its mean over a cycle, so that velocities do not jump at its kinks."""
+        """Factor of the ramp against time (s).
+
+        It is the mean of the linear ramp over a cycle, so that velocities do not jump at its kinks.
+        With the integral F of the linear ramp and the period T of the cycle, the factor at time t
+        is (F(t + T/2) - F(t - T/2)) / T: a polynomial of second order between the kinks of the two
+        terms.
+        """
         from scipy.interpolate import PPoly, make_interp_spline
 
         times, factors = np.array(self.ramp or ((0.0, 1.0),)).T
-        cycle, far = 1.0 / self.frequency, (times[0] - 9.0, times[-1] + 9.0)
-        even = make_interp_spline(
-            [far[0], *times, far[1]], [factors[0], *factors, factors[-1]], k=1
-        ).antiderivative()
+        # The factor is constant outside the ramp: the spline goes on for 9 s before and after it.
+        start = times[0] - 9.0
+        end = times[-1] + 9.0
+        linear = make_interp_spline([start, *times, end], [factors[0], *factors, factors[-1]], k=1)
+        integral = linear.antiderivative()
+
+        cycle = 1.0 / self.frequency
+        half = cycle / 2.0
         knots = np.unique(
-            [far[0] + cycle, *(times - cycle / 2.0), *(times + cycle / 2.0), far[1] - cycle]
+            np.concatenate([[start + cycle], times - half, times + half, [end - cycle]])
         )
-        places = (
-            (knots[1:] + knots[:-1]) / 2.0,
-            knots[:-1],
-            knots[:-1],
-        )  # the second derivative is not continuous
-        mean = [
-            even(at + cycle / 2.0, k) - even(at - cycle / 2.0, k)
-            for k, at in zip((2, 1, 0), places, strict=True)
-        ]
-        return PPoly(np.stack(mean) / [[2.0 * cycle], [cycle], [cycle]], knots)
+        left = knots[:-1]
+        middle = (knots[1:] + knots[:-1]) / 2.0
+
+        # The second derivative jumps at the knots; it is the same everywhere between two of them.
+        second = integral(middle + half, 2) - integral(middle - half, 2)
+        first = integral(left + half, 1) - integral(left - half, 1)
+        value = integral(left + half) - integral(left - half)
+        powers = np.stack([second / (2.0 * cycle), first / cycle, value / cycle])
+        return PPoly(powers, knots)
 
     def shaking(self, time: FloatArray) -> FloatArray:
-        """Displacement along x, y and z at times (s), m, shape (N, 3), without the slow part of a record.
+        """Displacement without the slow part of a record (`Record.slow_course`), as in pictures.
 
-        Pictures show this displacement. See `Record.slow_course`.
+        Parameters
+        ----------
+        time : ndarray, shape (N,)
+            Times after the start of the drive, s.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
+            Displacement along x, y and z, m.
         """
         if self.record:
             displacement = self.record.shaking(time)
@@ -368,59 +474,91 @@ class Excitation:
         return np.asarray(np.sum(parts, axis=0))
 
     def motions(self, time: FloatArray) -> Iterator[tuple[Vector, tuple[FloatArray, ...]]]:
-        """Direction of each harmonic or axis of a record, and displacement, velocity and acceleration at times (s)."""
-        for harmonic in self.harmonics:
-            turn = harmonic.angular_frequency * time + harmonic.phase
-            sine = np.sin(turn)
-            speed = harmonic.peak_velocity * np.cos(turn)
-            course = (harmonic.amplitude * sine, speed, -harmonic.peak_acceleration * sine)
-            yield harmonic.direction, self._ramped(time, *course)
-        if self.record:
-            moved = self.record.motion(time)
-            for axis, place in self.record.axes.items():
-                yield AXES[axis], self._ramped(time, *moved[..., place])
+        """The motion along the direction of each harmonic, or along each axis of a record.
 
-    def _ramped(self, time: FloatArray, *course: FloatArray) -> tuple[FloatArray, ...]:
-        """A motion with the ramp."""
+        Parameters
+        ----------
+        time : ndarray, shape (N,)
+            Times after the start of the drive, s.
+
+        Yields
+        ------
+        direction : Vector
+            A unit vector.
+        course : tuple of ndarray, shape (N,)
+            Displacement (m), velocity (m/s) and acceleration (m/s²) along it.
+        """
+        for harmonic in self.harmonics:
+            angle = harmonic.angular_frequency * time + harmonic.phase
+            sine = np.sin(angle)
+            displacement = harmonic.amplitude * sine
+            velocity = harmonic.peak_velocity * np.cos(angle)
+            acceleration = -harmonic.peak_acceleration * sine
+            yield harmonic.direction, self._ramped(time, displacement, velocity, acceleration)
+        if self.record:
+            motion = self.record.motion(time)
+            for axis, column in self.record.axes.items():
+                displacement, velocity, acceleration = motion[..., column]
+                yield AXES[axis], self._ramped(time, displacement, velocity, acceleration)
+
+    def _ramped(
+        self, time: FloatArray, x: FloatArray, v: FloatArray, a: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Displacement x, velocity v and acceleration a with the ramp, by the product rule."""
         if not self.ramp:
-            return course
-        (x, v, a), (factor, slope, bend) = course, (self.factor(time, order) for order in range(3))
-        return factor * x, factor * v + slope * x, factor * a + 2.0 * slope * v + bend * x
+            return x, v, a
+        factor = self.factor(time)
+        slope = self.factor(time, 1)
+        curvature = self.factor(time, 2)
+        return factor * x, factor * v + slope * x, factor * a + 2.0 * slope * v + curvature * x
 
     def course_files(self) -> dict[str, str]:
         """Names and contents of the files from which the engine reads a record and a ramp."""
-        record = self.record
-        files = {} if record is None else {
-            f"record.{axis}.txt": course_text(record.course.x, record.course.c[..., place], record.repeats)
-            for axis, place in record.axes.items()
-        }  # fmt: skip
-        return files | (
-            {"ramp.txt": course_text(self.factor.x, self.factor.c)} if self.ramp else {}
-        )
+        files = {}
+        if self.record is not None:
+            course = self.record.course
+            for axis, column in self.record.axes.items():
+                text = course_text(course.x, course.c[..., column], self.record.repeats)
+                files[f"record.{axis}.txt"] = text
+        if self.ramp:
+            files["ramp.txt"] = course_text(self.factor.x, self.factor.c)
+        return files
 
     def described(self) -> str:
-        """The drive in a few words, such as ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""
-        ramp = (
-            f", ramp {' to '.join(f'{factor:g}' for _, factor in self.ramp)}" if self.ramp else ""
-        )
-        if self.record:
-            largest, line = self.record.largest(2), self.record.amplitude_range[1]
-            of_line = f" (its line: {line:.4g} m/s²)" if line < _LINE_ALONE * largest else ""
-            return f"record, {self.frequency:.4g} Hz, a0 = {largest:.4g} m/s²{of_line}{ramp}"
-        shown = self.harmonics if len(self.harmonics) <= _FEW else (self.largest,)
-        words = [
-            f"{harmonic.frequency:g} Hz, a0 = {harmonic.peak_acceleration:.4g} m/s²"
-            + (f", {degrees(harmonic.phase):g}°" if harmonic.phase else "")
-            for harmonic in shown
-        ]
-        if len(shown) < len(self.harmonics):
-            highest = max(harmonic.frequency for harmonic in self.harmonics)
-            words.append(f"{len(self.harmonics) - 1} harmonics up to {highest:g} Hz")
-        return " + ".join(words) + ramp
+        """The drive in a few words: ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""
+        text = self._described_record(self.record) if self.record else self._described_harmonics()
+        if self.ramp:
+            text += ", ramp " + " to ".join(f"{factor:g}" for _, factor in self.ramp)
+        return text
+
+    def _described_record(self, record: Record) -> str:
+        """Frequency and largest acceleration of a record, and its line if it is clearly weaker."""
+        largest = record.largest(2)
+        line = record.amplitude_range[1]
+        text = f"record, {self.frequency:.4g} Hz, a0 = {largest:.4g} m/s²"
+        if line < _LINE_SHARE * largest:
+            text += f" (its line: {line:.4g} m/s²)"
+        return text
+
+    def _described_harmonics(self) -> str:
+        """All harmonics if they are few; else the largest one and the number of the others."""
+        if len(self.harmonics) <= _DESCRIBED_HARMONICS:
+            return " + ".join(_described_harmonic(harmonic) for harmonic in self.harmonics)
+        largest = _described_harmonic(self.largest)
+        highest = max(harmonic.frequency for harmonic in self.harmonics)
+        return f"{largest} + {len(self.harmonics) - 1} harmonics up to {highest:g} Hz"
+
+
+def _described_harmonic(harmonic: Harmonic) -> str:
+    """Frequency and peak acceleration of a harmonic, and its phase if it has one."""
+    text = f"{harmonic.frequency:g} Hz, a0 = {harmonic.peak_acceleration:.4g} m/s²"
+    if harmonic.phase:
+        text += f", {degrees(harmonic.phase):g}°"
+    return text
 
 
 def check_drive(drive: Excitation) -> None:
-    """Refuse a drive that is too strong or too fast, or a record that is too short or changes beside a ramp.
+    """Check the record and the ramp of a drive.
 
     Parameters
     ----------
@@ -430,28 +568,18 @@ def check_drive(drive: Excitation) -> None:
     Raises
     ------
     InputError
-        With the key ``drive.record`` or ``drive.ramp``.
+        With the key ``drive.record`` if the record is too fast, or too short for its offset. With
+        the key ``drive.ramp`` if the ramp makes the drive too strong, or if there is a ramp
+        although the amplitude of the record changes by itself.
     """
-    record = drive.record
-    if record:
-        _check_record(record)
-    largest = units.ACCELERATION.largest
-    if drive.ramp and drive.peak_acceleration > largest:
-        strongest = f"the largest one gives {drive.peak_acceleration:.6g} m/s²"
-        raise key_error(
-            "drive.ramp",
-            f"expected factors that give accelerations up to {largest:g} m/s²; {strongest}",
-        )
-    if drive.ramp and record and not record.is_stationary:
-        low, high = (
-            amplitude / units.ACCELERATION_OF_ONE_G for amplitude in record.amplitude_range
-        )
-        changes = f"the amplitude of drive.record changes by itself, from {low:.3g} to {high:.3g} g"
-        raise key_error("drive.ramp", f"expected none: {changes}")
+    if drive.record:
+        _check_record(drive.record)
+    if drive.ramp:
+        _check_ramp(drive)
 
 
 def _check_record(record: Record) -> None:
-    """Refuse a record that is too fast, or too short for its offset."""
+    """Raise `InputError` for a record that is too fast, or too short for its offset."""
     highest = units.FREQUENCY.largest
     if record.frequencies[1] > highest:
         actual = f"found {record.frequencies[1]:.4g} Hz: is the unit of the time right?"
@@ -460,48 +588,93 @@ def _check_record(record: Record) -> None:
         )
     periods = record.strongest_line * record.length
     if not record.repeats and periods < FEWEST_PERIODS:
-        least = f"expected at least {FEWEST_PERIODS:g} periods of its strongest line, found {periods:.2g}"
+        expected = f"expected at least {FEWEST_PERIODS:g} periods of its strongest line"
         reason = "the offset of the sensor cannot be told from the shaking"
-        cure = "drive.repeats = true takes it as a whole period"
-        raise key_error("drive.record", f"{least}: {reason}; {cure}", record.file)
+        remedy = "drive.repeats = true takes it as a whole period"
+        message = f"{expected}, found {periods:.2g}: {reason}; {remedy}"
+        raise key_error("drive.record", message, record.file)
+
+
+def _check_ramp(drive: Excitation) -> None:
+    """Raise `InputError` if the ramp makes the drive too strong, or if a record changes too."""
+    largest = units.ACCELERATION.largest
+    if drive.peak_acceleration > largest:
+        expected = f"expected factors that give accelerations up to {largest:g} m/s²"
+        actual = f"the largest one gives {drive.peak_acceleration:.6g} m/s²"
+        raise key_error("drive.ramp", f"{expected}; {actual}")
+    if drive.record and not drive.record.is_stationary:
+        weakest, strongest = drive.record.amplitude_range
+        low = weakest / units.ACCELERATION_OF_ONE_G
+        high = strongest / units.ACCELERATION_OF_ONE_G
+        reason = f"the amplitude of drive.record changes by itself, from {low:.3g} to {high:.3g} g"
+        raise key_error("drive.ramp", f"expected none: {reason}")
 
 
 def common_frequency(frequencies: list[float]) -> float:
-    """Frequency of the common period of several, Hz; raises `ValueError` if there is none, or it is too long."""
+    """Frequency of the common period of several oscillations.
+
+    Parameters
+    ----------
+    frequencies
+        The frequencies, Hz.
+
+    Returns
+    -------
+    float
+        The reciprocal of the common period, Hz.
+
+    Raises
+    ------
+    ValueError
+        If a ratio of frequencies is not one of whole numbers up to `LARGEST_RATIO`, or if the
+        common period is longer than `MOST_PERIODS` of the shortest periods.
+    """
     first = frequencies[0]
-    if len(frequencies) == 1:  # asked for at every turn of a sweep's plan
+    if len(frequencies) == 1:  # the usual case, for each of the many points of a sweep
         return first
-    ratios = [
-        Fraction(frequency / first).limit_denominator(LARGEST_RATIO) for frequency in frequencies
-    ]
-    for frequency, ratio in zip(frequencies, ratios, strict=True):
-        if (
-            not isclose(float(ratio) * first, frequency, rel_tol=1e-9)
-            or ratio.numerator > LARGEST_RATIO
-        ):
-            raise ValueError(
-                f"{frequency:g} Hz / {first:g} Hz is not a ratio of whole numbers up to {LARGEST_RATIO}"
-            )
-    below = lcm(*(ratio.denominator for ratio in ratios))
-    numerators = [int(ratio * below) for ratio in ratios]
+    ratios = [_ratio(frequency, first) for frequency in frequencies]
+    denominator = lcm(*(ratio.denominator for ratio in ratios))
+    numerators = [int(ratio * denominator) for ratio in ratios]
     common = gcd(*numerators)
     if max(numerators) > MOST_PERIODS * common:
         raise ValueError(
             f"their common period is longer than {MOST_PERIODS} times the shortest period"
         )
-    return first * common / below
+    return first * common / denominator
+
+
+def _ratio(frequency: float, first: float) -> Fraction:
+    """A frequency over the first; raises `ValueError` unless it is a ratio of small integers."""
+    ratio = Fraction(frequency / first).limit_denominator(LARGEST_RATIO)
+    is_exact = isclose(float(ratio) * first, frequency, rel_tol=1e-9)
+    if not is_exact or ratio.numerator > LARGEST_RATIO:
+        ratio_text = f"{frequency:g} Hz / {first:g} Hz"
+        raise ValueError(f"{ratio_text} is not a ratio of whole numbers up to {LARGEST_RATIO}")
+    return ratio
 
 
 def waveform(name: str, first: Harmonic) -> tuple[Harmonic, ...]:
-    """The harmonics of a periodic acceleration of `WAVEFORMS`, given its frequency, peak, direction and phase."""
-    return tuple(
-        first.with_values(
+    """The harmonics of a periodic acceleration.
+
+    Parameters
+    ----------
+    name
+        One of `WAVEFORMS`.
+    first
+        A sine of the frequency, the peak acceleration, the direction and the phase of the waveform.
+    """
+    harmonics = []
+    for multiple, share in WAVEFORMS[name]:
+        phase = multiple * first.phase
+        if share < 0.0:
+            phase += pi
+        harmonic = first.with_values(
             frequency=multiple * first.frequency,
             peak_acceleration=abs(share) * first.peak_acceleration,
-            phase=multiple * first.phase + (pi if share < 0.0 else 0.0),
+            phase=phase,
         )
-        for multiple, share in WAVEFORMS[name]
-    )
+        harmonics.append(harmonic)
+    return tuple(harmonics)
 
 
 def unit_vector(vector: Vector) -> Vector:
@@ -509,5 +682,5 @@ def unit_vector(vector: Vector) -> Vector:
     length = hypot(*vector)
     if not 1e-100 < length < 1e100:
         raise ValueError("expected a direction such as [1, 0, 1]")
-    x, y, z = (component / length for component in vector)
-    return (x, y, z)
+    x, y, z = vector
+    return (x / length, y / length, z / length)
