@@ -47,6 +47,8 @@ CASES: list[tuple[dict[str, Any], str]] = [
     ({"beads": {"density": 4000}}, "beads.density = 4000: expected a density with its unit"),
     ({"drive": {"peak_acceleration": "-4 g"}}, "it must be zero or more"),
     ({"drive": {"frequency": "500 rad/s"}}, "(cycles per second, not an angular frequency)"),
+    ({"drive": {"axis": [10**400, 0, 1]}}, "expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]"),
+    ({"drive": {"axis": [1e-200, 0, 0]}}, "expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]"),
     ({"contact": {"youngs_modulus": "1 MPa"}}, "it must lie between 5 and 100000 MPa"),
     # Numbers, lists, tables, names
     ({"dimers": {"radii": ["0.3 mm"]}}, '["0.3 mm"]: has 1 value; expected 2, such as ["0.3 mm", "0.2 mm"]'),

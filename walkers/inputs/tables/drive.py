@@ -7,12 +7,12 @@ its sines; its peak acceleration, and Γ0, belong to the largest sine. Files of 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from math import degrees, floor, gcd, hypot, inf, isclose, isfinite, lcm, pi
+from math import degrees, floor, gcd, hypot, inf, isclose, lcm, pi
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -45,6 +45,10 @@ _LINE_SHARE = 0.95
 share of the record's largest acceleration."""
 _TIME_TOLERANCE = 1e-9
 """Relative tolerance of equal times, and tolerance of whole numbers of cycles."""
+_SHORTEST_VECTOR = 1e-100
+"""Length below which a vector has no direction."""
+_LONGEST_VECTOR = 1e100
+"""Length above which a vector has no direction: squares of its components would overflow."""
 _AT_MOST_24 = Field(max_length=24)
 
 
@@ -73,14 +77,14 @@ the harmonics of a triangle, which end at the 9th, has 0.96 of the peak accelera
 
 
 def _is_direction(value: object) -> bool:
-    """Whether a value has three finite numbers as components, of which at least one is not zero."""
-    if not isinstance(value, (list, tuple)) or len(value) != 3 or not any(value):
+    """Whether a value has three numbers as components, and a length that is not zero or huge."""
+    if not isinstance(value, (list, tuple)) or len(value) != 3:
         return False
     for component in value:
         # A bool is an int to `isinstance`, but no component.
-        if type(component) not in (int, float) or not isfinite(component):
+        if type(component) not in (int, float) or not abs(component) < _LONGEST_VECTOR:
             return False
-    return True
+    return _has_direction(value)
 
 
 def _read_axis(value: object) -> object:
@@ -677,10 +681,15 @@ def waveform(name: str, first: Harmonic) -> tuple[Harmonic, ...]:
     return tuple(harmonics)
 
 
+def _has_direction(vector: Sequence[float]) -> bool:
+    """Whether the length of a vector is neither too small nor too large to divide it by."""
+    return _SHORTEST_VECTOR < hypot(*vector) < _LONGEST_VECTOR
+
+
 def unit_vector(vector: Vector) -> Vector:
     """A direction of length one; raises `ValueError` if the vector is zero."""
-    length = hypot(*vector)
-    if not 1e-100 < length < 1e100:
+    if not _has_direction(vector):
         raise ValueError("expected a direction such as [1, 0, 1]")
+    length = hypot(*vector)
     x, y, z = vector
     return (x / length, y / length, z / length)
