@@ -98,6 +98,14 @@ def test_largest_values_are_those_at_the_largest_factor_of_a_ramp() -> None:
     assert drive.amplitude == pytest.approx(0.1939e-3, rel=1e-3)
 
 
+def test_a_ramp_keeps_its_last_factor_for_a_slow_drive() -> None:
+    """A cycle of 20 s; the factor is its mean over a cycle, at 5 s that over -5 s to 15 s."""
+    ramp = [["0 s", 1], ["1 s", 0.2]]
+    drive = make_case(run=BRIEF, drive={"frequency": "0.05 Hz", "ramp": ramp}).excitation
+    at_5_s = (5.0 * 1.0 + 1.0 * 0.6 + 14.0 * 0.2) / 20.0
+    assert drive.factor(np.array([5.0, 12.0, 100.0])) == pytest.approx([at_5_s, 0.2, 0.2])
+
+
 @pytest.mark.parametrize("with_record", [False, True])
 def test_frames_and_engines_agree_on_a_ramp(with_record: bool, tmp_path: Path) -> None:
     """Of harmonics, and of a record with noise in two directions that does not repeat."""

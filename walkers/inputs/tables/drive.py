@@ -49,6 +49,8 @@ _SHORTEST_VECTOR = 1e-100
 """Length below which a vector has no direction."""
 _LONGEST_VECTOR = 1e100
 """Length above which a vector has no direction: squares of its components would overflow."""
+_MARGIN = 9.0
+"""Time before and after a ramp in its spline, s; slow drives have a longer one."""
 _AT_MOST_24 = Field(max_length=24)
 
 
@@ -435,14 +437,15 @@ class Excitation:
         from scipy.interpolate import PPoly, make_interp_spline
 
         times, factors = np.array(self.ramp or ((0.0, 1.0),)).T
-        # The factor is constant outside the ramp: the spline goes on for 9 s before and after it.
-        start = times[0] - 9.0
-        end = times[-1] + 9.0
-        linear = make_interp_spline([start, *times, end], [factors[0], *factors, factors[-1]], k=1)
-        integral = linear.antiderivative()
-
         cycle = 1.0 / self.frequency
         half = cycle / 2.0
+        # The factor is constant outside the ramp. The spline contains a part of it that is longer
+        # than the interval of the mean, so that the last piece of the result is constant, too.
+        margin = max(_MARGIN, 1.6 * cycle)
+        start = times[0] - margin
+        end = times[-1] + margin
+        linear = make_interp_spline([start, *times, end], [factors[0], *factors, factors[-1]], k=1)
+        integral = linear.antiderivative()
         knots = np.unique(
             np.concatenate([[start + cycle], times - half, times + half, [end - cycle]])
         )
