@@ -1,8 +1,9 @@
 """A case: what its file says (`CaseFile`), what forces depend on (`Setup`), and all of it (`Case`).
 
-All are in SI units; their fields are the keys of a file. `walkers.inputs.case_building` makes a `Case`
-of a file. A deck is rendered from it, a run directory stores it as ``case.json``, and the hash in a
-run's name is made of it.
+The fields of all three are the keys of a case file, in SI units. `walkers.inputs.case_building`
+makes a `Case` of a file. A deck is rendered from the case, a run directory stores it as
+``case.json``, and the hash in the name of a run is made of it. How values that a file leaves out
+follow from others is the subject of `walkers.inputs.resolving`.
 """
 
 from __future__ import annotations
@@ -46,28 +47,38 @@ from walkers.inputs.tables.materials import (
     LiquidTable,
 )
 from walkers.inputs.tables.run import RunSettings, RunTable, settling_of
-from walkers.inputs.units import kind_in
+from walkers.inputs.units import QuantityKind, kind_in
 from walkers.physics.bridge import BridgeLaw
 
 
-def _ranges(value: object) -> object:
-    """Ranges by dotted keys."""
+def _ranges_by_key(value: object) -> object:
+    """The table ``[uncertain]`` as `Ranges`; a value that is not a table is returned as it is."""
     if not isinstance(value, dict):
         return value
-    return {
-        name: ends if is_axis(ends) else {"uniform": ends} for name, ends in flatten(value).items()
-    }
+    ranges = {}
+    for name, ends in flatten(value).items():
+        ranges[name] = ends if is_axis(ends) else {"uniform": ends}
+    return ranges
 
 
-Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges)]
-"""As a sweep's samplers take them: for each key ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``."""
+Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges_by_key)]
+"""Ranges by dotted key: ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``.
+
+The samplers of a sweep take them in this form.
+"""
 _BODIES = ("dimers", "clusters", "mixture", "placed")
-_FEW_KINDS = Field(max_length=100)
-_FEW_BEADS = Field(max_length=MOST_BEADS)
+"""Keys of the tables of bodies, of which a case has at least one."""
+_AT_MOST_100 = Field(max_length=100)
+_AT_MOST_ALL_BEADS = Field(max_length=MOST_BEADS)
 _IN_WORDS = ("run.cycles", "run.samples_per_cycle")
-"""Keys with sources in words, which say more than their numbers: ``until constant within 0.2 %, at most 60``."""
-_ABOUT = ("document", "sources", "recorded_law", "uncertain")
-"""Fields that comparisons leave out: sources of values, and the law as its run has recorded it."""
+"""Keys whose values are given in words if their source has words, because these say more than the
+number: ``until constant within 0.2 %, at most 60``."""
+_PROVENANCE = ("document", "sources", "recorded_law", "uncertain")
+"""Fields that comparisons of cases leave out: they do not change what is computed."""
+_WITHOUT_ORIGIN = ("title", "uncertain", "drive.record.rows", "drive.record.ignored_columns")
+"""Keys that the list of origins leaves out."""
+_LISTS_WITHOUT_ORIGIN = ("placed[", "boundary.planes[")
+"""Starts of the keys in lists that the list of origins leaves out."""
 
 
 class CaseFile(ConfigTable):
@@ -78,9 +89,9 @@ class CaseFile(ConfigTable):
     )
     beads: BeadsTable = key("")
     dimers: DimersTable | None = key("", None)
-    clusters: Annotated[tuple[ClusterTable, ...], _FEW_KINDS] = key("", ())
+    clusters: Annotated[tuple[ClusterTable, ...], _AT_MOST_100] = key("", ())
     mixture: MixtureTable | None = key("", None)
-    placed: Annotated[tuple[PlacedBeadTable, ...], _FEW_BEADS] = key("", ())
+    placed: Annotated[tuple[PlacedBeadTable, ...], _AT_MOST_ALL_BEADS] = key("", ())
     boundary: Boundary = key("")
     drive: DriveTable = key("")
     liquid: LiquidTable = key("")
@@ -88,8 +99,8 @@ class CaseFile(ConfigTable):
     run: RunTable = key("", RunTable())
     environment: Environment = key("", Environment())
     uncertain: Annotated[Ranges, SAME_RUN] = key(
-        "Ranges of values that are guesses, by dotted key: `[low, high]`, or `{ loguniform = [low, high] }`. "
-        "See [](../../how-to/own-beads.md).",
+        "Ranges of values that are guesses, by dotted key: `[low, high]`, or "
+        "`{ loguniform = [low, high] }`. See [](../../how-to/own-beads.md).",
         {},
     )
 
@@ -102,64 +113,73 @@ class CaseFile(ConfigTable):
                 None,
                 "missing; expected bodies: [dimers], [[clusters]], [mixture] or [[placed]]",
             )
-        run, loose = given.get("run", {}), given.keys() & {"mixture", "placed"}
-        if loose and isinstance(run, Mapping) and not run.keys() & {"duration", "cycles"}:
-            yield RunTable.missing("duration", "run")
+        run = given.get("run", {})
+        has_loose_beads = "mixture" in given or "placed" in given
+        if has_loose_beads and isinstance(run, Mapping):
+            has_length = "duration" in run or "cycles" in run
+            if not has_length:
+                yield RunTable.missing("duration", "run")
         yield from super().problems(given, place)
 
 
 class Setup(CaseFile):
-    """A case with all values but those of its run, which is as the file says it.
+    """A case with all values except those of its run, which are as the file gives them.
 
     Forces and the loads of contacts depend on nothing else.
     """
 
     dimers: Dimers | None
-    clusters: Annotated[tuple[Cluster, ...], _FEW_KINDS]
+    clusters: Annotated[tuple[Cluster, ...], _AT_MOST_100]
     mixture: Mixture | None
-    placed: Annotated[tuple[PlacedBead, ...], _FEW_BEADS]
+    placed: Annotated[tuple[PlacedBead, ...], _AT_MOST_ALL_BEADS]
     drive: Drive
     liquid: Liquid
     contact: Contact
 
     @property
     def walkers_by_key(self) -> dict[str, Walkers]:
-        """All makes of walkers by their keys, dimers first."""
-        dimers: dict[str, Walkers] = {} if self.dimers is None else {"dimers": self.dimers}
-        return {
-            **dimers,
-            **{f"clusters[{number}]": cluster for number, cluster in enumerate(self.clusters)},
-        }
+        """All kinds of walkers by their keys in the case, dimers first."""
+        kinds: dict[str, Walkers] = {}
+        if self.dimers is not None:
+            kinds["dimers"] = self.dimers
+        for number, cluster in enumerate(self.clusters):
+            kinds[f"clusters[{number}]"] = cluster
+        return kinds
 
     @cached_property
     def walkers(self) -> tuple[Walkers, ...]:
-        """All makes of walkers, dimers first."""
+        """All kinds of walkers, dimers first."""
         return tuple(self.walkers_by_key.values())
 
     @property
     def excitation(self) -> Excitation:
-        """The oscillations of the drive."""
+        """The shaking of the boundary."""
         return self.drive.excitation
 
     @property
     def law(self) -> BridgeLaw:
-        """The law of its bridges."""
+        """The law of the bridges."""
         return by_name(self.liquid.law)
 
     @cached_property
     def bodies(self) -> tuple[Walkers | Mixture, ...]:
-        """All bodies of several beads, the walkers first."""
-        return (*self.walkers, *((self.mixture,) if self.mixture else ()))
+        """All kinds of walkers, then the mixture if there is one; not the placed beads."""
+        if self.mixture is None:
+            return self.walkers
+        return (*self.walkers, self.mixture)
 
     @cached_property
     def all_radii(self) -> list[float]:
-        """Radius of every bead, m."""
-        radii = [radius for body in self.bodies for radius in body.all_radii]
-        return [*radii, *(bead.radius for bead in self.placed)]
+        """Radius of every bead in the order of the bodies, m; placed beads are last."""
+        radii: list[float] = []
+        for body in self.bodies:
+            radii.extend(body.all_radii)
+        radii.extend(bead.radius for bead in self.placed)
+        return radii
 
     @property
     def count(self) -> int:
-        """How many beads there are."""
+        """Number of beads."""
         return len(self.all_radii)
 
     @property
@@ -169,9 +189,12 @@ class Setup(CaseFile):
 
     @property
     def radii(self) -> list[float]:
-        """The different radii of the beads, m, in the order of the bodies."""
-        radii = [radius for body in self.bodies for radius in body.radii]
-        return list(dict.fromkeys([*radii, *sorted(bead.radius for bead in self.placed)]))
+        """The different radii of the beads in the order of the bodies, m; placed beads are last."""
+        radii: list[float] = []
+        for body in self.bodies:
+            radii.extend(body.radii)
+        radii.extend(sorted(bead.radius for bead in self.placed))
+        return list(dict.fromkeys(radii))
 
     @property
     def loose(self) -> bool:
@@ -180,15 +203,20 @@ class Setup(CaseFile):
 
     @cached_property
     def border(self) -> float:
-        """A radius above all small beads and below all large ones, m; infinite for a single class."""
+        """A radius above all small beads and below all large ones, m; infinite if all are small.
+
+        Without a mixture, beads are large if their radius is above the middle of the range of
+        radii.
+        """
         if self.mixture is not None:
             return (max(self.mixture.small_radii) + min(self.mixture.large_radii)) / 2.0
         sizes = sorted(self.radii)
         middle = (sizes[0] + sizes[-1]) / 2.0
-        small, large = (
-            [size for size in sizes if (size > middle) is above] for above in (False, True)
-        )
-        return (small[-1] + large[0]) / 2.0 if large else inf
+        small = [size for size in sizes if size <= middle]
+        large = [size for size in sizes if size > middle]
+        if not large:
+            return inf
+        return (small[-1] + large[0]) / 2.0
 
     @property
     def apart(self) -> bool:
@@ -202,32 +230,46 @@ class Setup(CaseFile):
 
     @cached_property
     def shifted_rows(self) -> int:
-        """Even length of the rows of walkers if every second row begins facing left, so that neighbours meet; or 0."""
-        both = [walkers for walkers in self.walkers if walkers.facing == "both"]
-        if not self.meets or all(isclose(walkers.angle_spread, pi) for walkers in both):
+        """Number of walkers in a row if every second row has to start facing left; otherwise 0.
+
+        Walkers that alternately face right and left stand in rows. If the number in a row is even,
+        all walkers of a column would face the same way and never meet; so the directions of every
+        second row are exchanged. This is needed only if walkers may meet, and do not face at
+        random.
+        """
+        alternating = [walkers for walkers in self.walkers if walkers.facing == "both"]
+        all_at_random = all(isclose(walkers.angle_spread, pi) for walkers in alternating)
+        if not self.meets or all_at_random:
             return 0
-        rows = [
-            x
-            for x, _ in self.boundary.geometry.grid(
-                sum(walkers.replicates for walkers in self.walkers), 1.0
-            )
-        ]
-        length = rows.count(rows[0])
-        return length if length % 2 == 0 and length < len(rows) else 0
+        number = sum(walkers.replicates for walkers in self.walkers)
+        x_of_walkers = [x for x, _ in self.boundary.geometry.grid(number, 1.0)]
+        row_length = x_of_walkers.count(x_of_walkers[0])
+        has_several_rows = row_length < number
+        if has_several_rows and row_length % 2 == 0:
+            return row_length
+        return 0
 
     @property
     def drive_axis(self) -> Vector:
-        """Direction of the largest harmonic (the first of equal ones) in the plane of the floor; x if it has none."""
+        """Direction of the drive in the plane of the substrate, a unit vector.
+
+        It is that of the largest harmonic; x if this shakes normal to the substrate.
+        """
         x, y, _ = self.excitation.direction
         length = hypot(x, y)
-        return (x / length, y / length, 0.0) if length else AXES["x"]
+        if length == 0.0:
+            return AXES["x"]
+        return (x / length, y / length, 0.0)
 
     @property
     def goes_uphill(self) -> bool:
-        """Whether the drive axis points uphill on a tilted floor; then right is up, and left is down."""
+        """Whether the drive axis points uphill on a tilted substrate: right is up, left is down."""
+        if self.boundary.tilt == 0.0:
+            return False
         x, y, _ = self.drive_axis
-        uphill = (cos(self.boundary.uphill), sin(self.boundary.uphill))
-        return bool(self.boundary.tilt) and x * uphill[0] + y * uphill[1] > 1.0 - 1e-9
+        uphill_x = cos(self.boundary.uphill)
+        uphill_y = sin(self.boundary.uphill)
+        return x * uphill_x + y * uphill_y > 1.0 - 1e-9
 
     @property
     def gravity_vector(self) -> Vector:
@@ -236,23 +278,33 @@ class Setup(CaseFile):
 
     @property
     def pressing_gravity(self) -> float:
-        """Component of gravity normal to the floor, m/s²."""
+        """Component of gravity normal to the substrate, toward it, m/s²."""
         return -self.gravity_vector[2]
 
     @property
     def axial_gravity(self) -> float:
         """Component of gravity against the drive axis, m/s²."""
-        return -sum(
-            component * along
-            for component, along in zip(self.gravity_vector, self.drive_axis, strict=True)
-        )
+        pairs = zip(self.gravity_vector, self.drive_axis, strict=True)
+        return -sum(gravity * direction for gravity, direction in pairs)
 
 
 class Case(Setup):
     """A case with all values.
 
-    ``document`` has the tables that the case was read from, ``sources`` the `Source` of each value that they do not
-    give, and ``recorded_law`` is a user's law as a run has recorded it.
+    Attributes
+    ----------
+    name : str
+        Name of the case, usually of its file without the suffix.
+    document : dict
+        The tables that the case was read from.
+    sources : dict
+        The `Source` of each value that the tables do not give, by dotted key.
+    recorded_law : BridgeLaw or None
+        The law of a user as a run has recorded it.
+
+    Notes
+    -----
+    The other fields are the tables of a case file.
     """
 
     run: RunSettings
@@ -263,78 +315,90 @@ class Case(Setup):
 
     @cached_property
     def _values(self) -> tuple[Any, ...]:
-        return tuple(getattr(self, name) for name in type(self).model_fields if name not in _ABOUT)
+        """What comparisons of cases compare."""
+        names = [name for name in type(self).model_fields if name not in _PROVENANCE]
+        return tuple(getattr(self, name) for name in names)
 
     def as_dict(self) -> dict[str, Any]:
-        """The whole case as plain JSON types, SI units, with the tables it was read from and its values' sources."""
+        """The whole case in plain JSON types and SI units.
+
+        It includes the tables from which the case was read, and the sources of its values.
+        """
         return self.model_dump(mode="json")
 
     def for_cycles(self, cycles: int) -> Case:
-        """The same case with a fixed number of cycles in one segment."""
+        """The case with a fixed number of cycles in one segment, instead of an upper limit.
+
+        A case whose number of cycles is fixed already is returned as it is.
+        """
         if not self.run.until_steady:
             return self
-        fixed = {
-            "until_steady": False,
-            "settling_cycles": settling_of(cycles),
-            "cycles_per_segment": cycles,
-        }
-        return self.with_values(run=self.run.with_values(cycles=cycles, **fixed))
+        run = self.run.with_values(
+            cycles=cycles,
+            until_steady=False,
+            settling_cycles=settling_of(cycles),
+            cycles_per_segment=cycles,
+        )
+        return self.with_values(run=run)
 
     @cached_property
     def origins(self) -> tuple[Origin, ...]:
         """Origins of the values, in the order of the tables of a case file."""
         origins: dict[str, Origin] = {}
         for name, value, field in self.leaves():
-            in_no_file = ("title", "uncertain", "drive.record.rows", "drive.record.ignored_columns")
-            if name in in_no_file or name.startswith(("placed[", "boundary.planes[")):
+            if name in _WITHOUT_ORIGIN or name.startswith(_LISTS_WITHOUT_ORIGIN):
                 continue
-            raw, kind = (
-                value_at(self.document, parts_of(name)),
-                kind_in([*field.metadata, field.annotation]),
-            )
-            if raw is not MISSING and not units.is_auto(raw):
-                # The step of the run is a little shorter, so that it fits into a cycle.
-                limit = units.parse_quantity(raw, units.TIME) if name == "run.time_step" else value
-                origins[name] = Origin(name, text_of(raw), "given", value=limit)
-            elif (source := self.sources.get(name)) and (source.text or value is not None):
-                text = source.text or text_of(value, kind)
-                about = (source.origin, source.why, source.range, source.logarithmic)
-                in_words = source.text and (value is None or name in _IN_WORDS)
-                origins[name] = Origin(name, text, *about, value=text if in_words else value)
-            elif value not in (None, "", ()):
-                origins[name] = Origin(name, text_of(value, kind), "default", value=value)
-        for name, given in self.uncertain.items():
-            ((distribution, (low, high)),) = given.items()
-            # What has no line of its own, such as one of two radii, has one if the case calls it uncertain.
-            raw = value_at(self.document, parts_of(name))
-            origin = origins.get(name) or Origin(
-                name, "-" if raw is MISSING else text_of(raw), "given"
-            )
-            logarithmic = distribution == "loguniform"
-            origins[name] = replace(
-                origin, range=(low, high), logarithmic=logarithmic, uncertain=True
-            )
+            kind = kind_in([*field.metadata, field.annotation])
+            origin = self._origin_of(name, value, kind)
+            if origin is not None:
+                origins[name] = origin
+        for name, distribution in self.uncertain.items():
+            # A value without an origin, such as one of two radii, has one if it is uncertain.
+            origin = origins.get(name) or self._given_origin(name)
+            origins[name] = _with_range(origin, distribution)
         return tuple(origins.values())
 
+    def _origin_of(self, name: str, value: Any, kind: QuantityKind | None) -> Origin | None:
+        """Origin of a value by its dotted key; None if the case has no value there."""
+        given = value_at(self.document, parts_of(name))
+        if given is not MISSING and not units.is_auto(given):
+            if name == "run.time_step":
+                # The file gives an upper limit: the step of the run fits into a cycle.
+                value = units.parse_quantity(given, units.TIME)
+            return Origin(name, text_of(given), "given", value=value)
+        source = self.sources.get(name)
+        if source is not None and (source.text or value is not None):
+            return _origin_from_source(name, source, value, kind)
+        if value not in (None, "", ()):
+            return Origin(name, text_of(value, kind), "default", value=value)
+        return None
+
+    def _given_origin(self, name: str) -> Origin:
+        """Origin of a dotted key with the text of the case file, ``-`` if the file has none."""
+        given = value_at(self.document, parts_of(name))
+        text = "-" if given is MISSING else text_of(given)
+        return Origin(name, text, "given")
+
     def __repr__(self) -> str:
-        given = ", ".join(
-            f"{origin.key} = {origin.text}" for origin in self.origins if origin.origin == "given"
-        )
-        return f"<Case {self.name}: {given}>"
+        given = [origin for origin in self.origins if origin.origin == "given"]
+        text = ", ".join(f"{origin.key} = {origin.text}" for origin in given)
+        return f"<Case {self.name}: {text}>"
 
     __str__ = __repr__
 
     def _repr_html_(self) -> str:
         """All values with their origins, for notebooks."""
-        cells = ([origin.key, origin.text, origin.word, origin.source] for origin in self.origins)
-        rows = "".join(
-            f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in cells
-        )
-        return f"<table><caption>{escape(self.title or self.name)}</caption>{rows}</table>"
+        rows = []
+        for origin in self.origins:
+            texts = (origin.key, origin.text, origin.word, origin.source)
+            cells = "".join(f"<td>{escape(text)}</td>" for text in texts)
+            rows.append(f"<tr>{cells}</tr>")
+        caption = escape(self.title or self.name)
+        return f"<table><caption>{caption}</caption>{''.join(rows)}</table>"
 
     @property
     def law(self) -> BridgeLaw:
-        """The law of its bridges: as its run has recorded it, else the law of the liquid."""
+        """The law of the bridges: the one that the run has recorded, or that of the liquid."""
         law: BridgeLaw = self.recorded_law or super().law
         return law
 
@@ -345,5 +409,30 @@ class Case(Setup):
 
     @property
     def independent(self) -> bool:
-        """Whether its walkers are so wherever they stand, so that others' may stand beside them in a deck."""
+        """Whether the walkers of other cases may stand beside those of this one in a deck.
+
+        They may if no walker meets another and the boundary is the same everywhere.
+        """
         return self.apart and self.run.has_one_segment and self.boundary.bare
+
+
+def _origin_from_source(name: str, source: Source, value: Any, kind: QuantityKind | None) -> Origin:
+    """Origin of a value that the case file does not give; some are described in words."""
+    text = source.text or text_of(value, kind)
+    if source.text and (value is None or name in _IN_WORDS):
+        value = text
+    return Origin(
+        key=name,
+        text=text,
+        origin=source.origin,
+        source=source.why,
+        range=source.range,
+        logarithmic=source.logarithmic,
+        value=value,
+    )
+
+
+def _with_range(origin: Origin, distribution: Mapping[str, Any]) -> Origin:
+    """The origin of a value that the case calls uncertain, with its range (as in `Ranges`)."""
+    ((name, (low, high)),) = distribution.items()
+    return replace(origin, range=(low, high), logarithmic=name == "loguniform", uncertain=True)
