@@ -1,8 +1,9 @@
-"""Where the beads of a walker stand beside each other: arrangements by name, and what follows from them.
+"""Where the beads of a walker stand beside each other: arrangements, and what follows from them.
 
-How the beads of a cluster stand is one of `ARRANGEMENTS`: in the cluster's frame, seen from above, whose first axis
-points where it is to face and the second to the left. The beads are taken in the order of the case, and the point over
-which the first two touch is the origin. Where walkers start is the subject of `walkers.inputs.resolving.standing`.
+An arrangement of `ARRANGEMENTS` gives the places of the beads of a cluster in the frame of the
+walker, seen from above. The first axis of this frame points where the walker is to face, the second
+to its left. Beads are numbered in the order of the case; the origin is the point over which the
+first two touch. Where walkers start is the subject of `walkers.inputs.resolving.standing`.
 """
 
 from __future__ import annotations
@@ -12,91 +13,149 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from math import acos, asin, cos, dist, hypot, pi, sin, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-Apart = Callable[[int, int], float]
-"""Distance of two touching beads seen from above, m, by their numbers."""
+TouchingDistance = Callable[[int, int], float]
+"""Distance seen from above of two beads that touch, m, by their numbers."""
 Places = list[tuple[float, float]]
+"""Places of the beads in the frame of a walker, m."""
 Pairs = tuple[tuple[int, int], ...]
-_LEAST_LEVER = 0.1
-"""Smallest distance of the centroids of large and small beads that gives a heading, over the extent of a cluster."""
-_TOUCHING = 0.02  # radii by which beads that are given places may be apart and still touch
+"""Numbers of two beads each, the smaller one first."""
+_SHORTEST_LEVER = 0.1
+"""Smallest distance of the centroids of large and small beads that gives a heading.
+
+It is in lengths of the walker."""
+_TOUCHING = 0.02
+"""Largest gap of beads that touch if their places are given, in radii of the smaller one."""
 _TOO_SMALL = "a bead is too small to touch two beads that touch each other; expected a larger one"
 
 
-class Arrangement(NamedTuple):
-    """Positions of ``fewest`` to ``most`` beads, from radii and `Apart`."""
+@dataclass(frozen=True)
+class Arrangement:
+    """An arrangement of the beads of a walker.
 
-    places: Callable[[Sequence[float], Apart], Places]
+    Attributes
+    ----------
+    places : callable
+        Gives the `Places` for the radii of the beads (m) and a `TouchingDistance`; raises
+        `ValueError` if these beads cannot be arranged so.
+    fewest : int
+        Smallest number of beads.
+    most : int
+        Largest number of beads.
+    """
+
+    places: Callable[[Sequence[float], TouchingDistance], Places]
     fewest: int
     most: int = 100
 
 
-def _chain(radii: Sequence[float], apart: Apart) -> Places:
+def _chain(radii: Sequence[float], distance: TouchingDistance) -> Places:
     """One behind the other, the first in front."""
-    along = [apart(0, 1) * radii[0] / (radii[0] + radii[1])]
+    x = distance(0, 1) * radii[0] / (radii[0] + radii[1])
+    places = [(x, 0.0)]
     for bead in range(len(radii) - 1):
-        along.append(along[-1] - apart(bead, bead + 1))
-    return [(place, 0.0) for place in along]
-
-
-def _fan(radii: Sequence[float], apart: Apart) -> Places:
-    """The first bead in front, the others behind it: all touch it, and each the next."""
-    turns = [0.0]
-    for bead in range(1, len(radii) - 1):
-        side, next_side, between = apart(0, bead), apart(0, bead + 1), apart(bead, bead + 1)
-        cosine = (side**2 + next_side**2 - between**2) / (2.0 * side * next_side)
-        if abs(cosine) > 1.0:
-            raise ValueError(_TOO_SMALL)
-        turns.append(turns[-1] + acos(cosine))
-    if turns[-1] + turns[-1] / max(len(turns) - 1, 1) > 2.0 * pi * (1.0 + 1e-9):
-        raise ValueError("too many beads to fit around the first one; expected fewer")
-    front = apart(0, 1) * radii[0] / (radii[0] + radii[1])
-    behind = [(apart(0, bead), pi - turns[-1] / 2.0 + turn) for bead, turn in enumerate(turns, 1)]
-    return [(front, 0.0), *((front + away * cos(turn), away * sin(turn)) for away, turn in behind)]
-
-
-def _diamond(radii: Sequence[float], apart: Apart) -> Places:
-    """One in front, two side by side behind it, one at the back that touches these two."""
-    front, left, right = _fan(radii[:3], apart)
-    along, across = right[0] - left[0], right[1] - left[1]
-    width, reach, last_reach = apart(1, 2), apart(1, 3), apart(2, 3)
-    share = (reach**2 - last_reach**2 + width**2) / (2.0 * width**2)
-    if reach < abs(share) * width:
-        raise ValueError(_TOO_SMALL)
-    height = sqrt(reach**2 - (share * width) ** 2) / width
-    back = (left[0] + share * along + height * across, left[1] + share * across - height * along)
-    return [front, left, right, back]
-
-
-def _ring(radii: Sequence[float], apart: Apart) -> Places:
-    """All on a circle, each touching the next, the first one in front."""
-    number = len(radii)
-    chords = [apart(bead, (bead + 1) % number) for bead in range(number)]
-    low, high = max(chords) / 2.0, sum(chords)
-
-    def turns(radius: float) -> list[float]:
-        return [2.0 * asin(min(chord / (2.0 * radius), 1.0)) for chord in chords]
-
-    if sum(turns(low)) < 2.0 * pi:
-        raise ValueError(
-            "these beads do not form a closed ring; expected more beads, or more similar radii"
-        )
-    for _ in range(200):
-        middle = (low + high) / 2.0
-        low, high = (middle, high) if sum(turns(middle)) > 2.0 * pi else (low, middle)
-    place, places = 0.0, []
-    for turn in turns(high):
-        places.append((high * cos(place), high * sin(place)))
-        place += turn
+        x -= distance(bead, bead + 1)
+        places.append((x, 0.0))
     return places
 
 
+def _fan(radii: Sequence[float], distance: TouchingDistance) -> Places:
+    """The first bead in front, the others behind it: all touch the first, and each the next."""
+    angles = [0.0]  # of the beads behind, around the first one and from the second one
+    for bead in range(1, len(radii) - 1):
+        side = distance(0, bead)
+        next_side = distance(0, bead + 1)
+        between = distance(bead, bead + 1)
+        cosine = (side**2 + next_side**2 - between**2) / (2.0 * side * next_side)
+        if abs(cosine) > 1.0:
+            raise ValueError(_TOO_SMALL)
+        angles.append(angles[-1] + acos(cosine))
+    opening = angles[-1]
+    mean_step = opening / max(len(angles) - 1, 1)
+    if opening + mean_step > 2.0 * pi * (1.0 + 1e-9):
+        raise ValueError("too many beads to fit around the first one; expected fewer")
+    front = distance(0, 1) * radii[0] / (radii[0] + radii[1])
+    places = [(front, 0.0)]
+    for bead, angle in enumerate(angles, 1):
+        side = distance(0, bead)
+        direction = pi - opening / 2.0 + angle
+        places.append((front + side * cos(direction), side * sin(direction)))
+    return places
+
+
+def _diamond(radii: Sequence[float], distance: TouchingDistance) -> Places:
+    """One in front, two side by side behind it, and one at the back that touches these two."""
+    front, left, right = _fan(radii[:3], distance)
+    width = distance(1, 2)
+    to_left = distance(1, 3)
+    to_right = distance(2, 3)
+    # The last bead stands behind the line from left to right. The foot of its perpendicular and the
+    # length of this are in units of the line.
+    foot = (to_left**2 - to_right**2 + width**2) / (2.0 * width**2)
+    if to_left < abs(foot) * width:
+        raise ValueError(_TOO_SMALL)
+    height = sqrt(to_left**2 - (foot * width) ** 2) / width
+    line_x = right[0] - left[0]
+    line_y = right[1] - left[1]
+    back = (left[0] + foot * line_x + height * line_y, left[1] + foot * line_y - height * line_x)
+    return [front, left, right, back]
+
+
+def _ring(radii: Sequence[float], distance: TouchingDistance) -> Places:
+    """All on a circle, each touching the next, the first one in front."""
+    number = len(radii)
+    chords = [distance(bead, (bead + 1) % number) for bead in range(number)]
+    smallest_radius = max(chords) / 2.0
+    if sum(_angles_of_chords(chords, smallest_radius)) < 2.0 * pi:
+        raise ValueError(
+            "these beads do not form a closed ring; expected more beads, or more similar radii"
+        )
+    radius = _circumradius(chords, smallest_radius)
+    places = []
+    angle = 0.0
+    for step in _angles_of_chords(chords, radius):
+        places.append((radius * cos(angle), radius * sin(angle)))
+        angle += step
+    return places
+
+
+def _circumradius(chords: Sequence[float], smallest: float) -> float:
+    """Radius of the circle (m) on which chords (m) close a polygon, at least a smallest one (m)."""
+    low = smallest
+    high = sum(chords)
+    for _ in range(200):  # bisections
+        middle = (low + high) / 2.0
+        if sum(_angles_of_chords(chords, middle)) > 2.0 * pi:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _angles_of_chords(chords: Sequence[float], radius: float) -> list[float]:
+    """Angles that chords (m) of a circle of a radius (m) subtend at its centre, rad."""
+    return [2.0 * asin(min(chord / (2.0 * radius), 1.0)) for chord in chords]
+
+
 def touching(places: Sequence[tuple[float, float]], radii: Sequence[float], slack: float) -> Pairs:
-    """Pairs of beads at given positions whose gap is below a fraction of their radii."""
+    """Pairs of beads that touch when all of them rest on a plane.
+
+    Parameters
+    ----------
+    places
+        Places of the beads seen from above, m.
+    radii
+        Radii of the beads, m.
+    slack
+        Beads touch if their gap is below this share of the smaller radius.
+    """
     pairs = []
-    for (first, (x, y)), (second, (to_x, to_y)) in combinations(enumerate(places), 2):
-        gap = hypot(x - to_x, y - to_y, radii[first] - radii[second]) - radii[first] - radii[second]
+    for first, second in combinations(range(len(places)), 2):
+        x, y = places[first]
+        to_x, to_y = places[second]
+        distance = hypot(x - to_x, y - to_y, radii[first] - radii[second])
+        gap = distance - radii[first] - radii[second]
         if gap < slack * min(radii[first], radii[second]):
             pairs.append((first, second))
     return tuple(pairs)
@@ -112,7 +171,7 @@ ARRANGEMENTS: Mapping[str, Arrangement] = {
 
 
 class WalkerGeometry:
-    """What follows from the radii of a walker's beads and from their arrangement, or the place of each."""
+    """What follows from the radii of a walker's beads and their arrangement, or their places."""
 
     if TYPE_CHECKING:
         radii: tuple[float, ...]
@@ -125,12 +184,16 @@ class WalkerGeometry:
     @cached_property
     def pairs(self) -> Pairs:
         """The beads of a walker that touch at the start, numbered from 0."""
-        pairs, last = touching(self.design, self.radii, _TOUCHING), len(self.radii) - 1
-        if self.arrangement == "ring":  # closed by the last pair
-            pairs = (*(pair for pair in pairs if pair != (0, last)), (0, last))
-        if self.arrangement == "fan" and last > 2:  # not closed, even by beads all around
-            pairs = tuple(pair for pair in pairs if pair != (1, last))
-        return pairs
+        pairs = list(touching(self.design, self.radii, _TOUCHING))
+        last = len(self.radii) - 1
+        if self.arrangement == "ring":
+            # The pair of the last and the first bead closes the ring and is the last one.
+            pairs = [pair for pair in pairs if pair != (0, last)]
+            pairs.append((0, last))
+        if self.arrangement == "fan" and last > 2:
+            # A fan is not closed, even if its beads stand all around the first one.
+            pairs = [pair for pair in pairs if pair != (1, last)]
+        return tuple(pairs)
 
     @property
     def bridged(self) -> list[tuple[float, list[float]]]:
@@ -144,76 +207,123 @@ class WalkerGeometry:
     @cached_property
     def design(self) -> Places:
         """Positions of rigid beads on a plane in the frame of the walker, m."""
-        return list(self.at) or ARRANGEMENTS[self.arrangement].places(self.radii, self.rigid_distance)
+        if self.at:
+            return list(self.at)
+        return ARRANGEMENTS[self.arrangement].places(self.radii, self.rigid_distance)
 
     def rigid_distance(self, bead: int, neighbour: int) -> float:
-        """Distance seen from above of two beads that touch each other and the floor without overlap, m."""
-        first, second = self.radii[bead], self.radii[neighbour]
+        """Distance seen from above of two rigid beads that touch each other and a plane, m.
+
+        The beads are given by their numbers.
+        """
+        first = self.radii[bead]
+        second = self.radii[neighbour]
         return (first + second) * cos(asin((first - second) / (first + second)))
 
     @cached_property
     def length(self) -> float:
-        """Length of the walker seen from above, m."""
-        distances = {} if self.at else {pair: self.rigid_distance(*pair) for pair in self.pairs}
+        """Length of the walker seen from above, m: the largest one over two of its beads."""
+        touching_pairs: Pairs = ()
+        if not self.at:
+            touching_pairs = self.pairs
         extents = []
         for first, second in combinations(range(len(self.radii)), 2):
-            distance = distances.get((first, second), dist(self.design[first], self.design[second]))
+            if (first, second) in touching_pairs:
+                distance = self.rigid_distance(first, second)
+            else:
+                distance = dist(self.design[first], self.design[second])
             extents.append(distance + (self.radii[first] + self.radii[second]))
         return max(extents)
 
     @cached_property
     def front(self) -> tuple[float, ...]:
-        """Weights of bead positions in the vector along the start direction; their sum is zero."""
-        along = [place[0] for place in self.design]
-        middle = sum(along) / len(along)
-        largest = max(abs(place - middle) for place in along)
-        if (
-            largest < 1e-9 * self.length
-        ):  # all side by side: it faces the way that is to the right of their row
-            return tuple(0.0 for _ in along)
-        return tuple((place - middle) / largest for place in along)
+        """Weights of bead positions in the vector along the start direction.
+
+        Their sum is zero. All are zero if the beads stand side by side; such a walker faces the way
+        that is to the right of their row.
+        """
+        x_of_beads = [x for x, _ in self.design]
+        middle = sum(x_of_beads) / len(x_of_beads)
+        largest = max(abs(x - middle) for x in x_of_beads)
+        if largest < 1e-9 * self.length:
+            return tuple(0.0 for _ in x_of_beads)
+        return tuple((x - middle) / largest for x in x_of_beads)
 
     @cached_property
     def toward_large(self) -> tuple[float, ...]:
-        """Weights of bead positions in the heading, from the centroid of small beads to that of large ones.
+        """Weights of bead positions in the heading.
 
-        Where all beads are alike, or the two centroids nearly coincide, the heading is where the walker was to face.
+        The heading is the vector from the centroid of the small beads to that of the large ones. If
+        all beads have the same size, or if the centroids nearly coincide, the heading is the
+        direction in which the walker was to face (`front`).
         """
         border = (min(self.radii) + max(self.radii)) / 2.0
         large = [radius > border for radius in self.radii]
         if not any(large):
             return self.front
-        many = (sum(large), len(large) - sum(large))
-        weights = tuple(1.0 / many[0] if is_large else -1.0 / many[1] for is_large in large)
-        axes = zip(*self.design, strict=True)
-        lever = [sum(weight * x for weight, x in zip(weights, axis, strict=True)) for axis in axes]
-        return weights if hypot(*lever) > _LEAST_LEVER * self.length else self.front
+        large_count = sum(large)
+        small_count = len(large) - large_count
+        weights = tuple(1.0 / large_count if is_large else -1.0 / small_count for is_large in large)
+        lever = []
+        for coordinates in zip(*self.design, strict=True):
+            weighted = zip(weights, coordinates, strict=True)
+            lever.append(sum(weight * coordinate for weight, coordinate in weighted))
+        if hypot(*lever) > _SHORTEST_LEVER * self.length:
+            return weights
+        return self.front
 
     def places(self, heights: Sequence[float], overlaps: Sequence[float]) -> Places:
-        """Positions of the beads of a walker in its frame, from heights and overlaps, m."""
+        """Positions of the beads of a walker at rest in its frame.
+
+        Parameters
+        ----------
+        heights
+            Height of the centre of each bead, m.
+        overlaps
+            Overlap of each bead with the boundary, then of each of the `pairs`, m.
+
+        Returns
+        -------
+        Places
+            x and y of each bead, m; the given ones of a walker whose beads have places.
+
+        Raises
+        ------
+        ValueError
+            If two beads of a pair do not touch at these heights, or cannot be arranged.
+        """
         if self.at:
             return list(self.at)
-        overlap_of = {
-            pair: overlaps[len(self.radii) + number] for number, pair in enumerate(self.pairs)
-        }
+        pair_overlaps = dict(zip(self.pairs, overlaps[len(self.radii) :], strict=True))
 
-        def apart(first: int, second: int) -> float:
-            between = (
-                self.radii[first]
-                + self.radii[second]
-                - overlap_of[min(first, second), max(first, second)]
-            )
-            if between < abs(heights[first] - heights[second]):
-                message = "the radii differ too much: the beads do not touch when they rest on the boundary"
-                raise ValueError(f"{message}; expected more similar radii")
-            return sqrt(between**2 - (heights[first] - heights[second]) ** 2)
+        def distance(first: int, second: int) -> float:
+            """See `TouchingDistance`."""
+            overlap = pair_overlaps[min(first, second), max(first, second)]
+            between_centres = self.radii[first] + self.radii[second] - overlap
+            step = heights[first] - heights[second]
+            if between_centres < abs(step):
+                raise ValueError(
+                    "the radii differ too much: the beads do not touch when they rest on the "
+                    "boundary; expected more similar radii"
+                )
+            return sqrt(between_centres**2 - step**2)
 
-        return ARRANGEMENTS[self.arrangement].places(self.radii, apart)
+        return ARRANGEMENTS[self.arrangement].places(self.radii, distance)
 
 
 @dataclass(frozen=True)
 class BareWalker(WalkerGeometry):
-    """A walker by its geometry alone."""
+    """A walker by its geometry alone: the radii of its beads, and an arrangement or their places.
+
+    Attributes
+    ----------
+    radii : tuple of float
+        Radii of the beads, m.
+    arrangement : str
+        One of `ARRANGEMENTS`; empty if ``at`` is given.
+    at : tuple of tuple
+        Places of the beads, m; empty for an arrangement.
+    """
 
     radii: tuple[float, ...]
     arrangement: str
