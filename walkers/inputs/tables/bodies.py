@@ -1,8 +1,9 @@
 """Beads of a case: walkers on the boundary, a poured mixture, beads placed one by one.
 
-The tables of a case file (`DimersTable`, ...) may lack values that follow from others; the bodies of a resolved case
-(`Dimers`, ...) have all of them. Each knows its radii and which of its beads bridges join; where they start is the
-subject of `walkers.inputs.resolving.standing`.
+The tables of a case file (`DimersTable`, ...) may lack values that follow from others; the bodies
+of a resolved case (`Dimers`, ...) have all of them. Each body knows the radii of its beads, and
+which of them are joined by bridges. Where the beads start is the subject of
+`walkers.inputs.resolving.standing`.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ from walkers.inputs.tables.arrangements import WalkerGeometry
 from walkers.inputs.units import Diameter, Length, Number, Position, Radius, SignedLength, Whole
 from walkers.physics.capillary import bead_volume
 
-_Place = tuple[SignedLength, SignedLength]
-_FEW = Field(min_length=2, max_length=100)
-_Radii = Annotated[tuple[Radius, ...], _FEW]
-_Diameters = Annotated[tuple[Diameter, ...], _FEW]
 MOST_BEADS = 200_000
+"""Largest number of beads of a case."""
+_Place = tuple[SignedLength, SignedLength]
+_FROM_2_TO_100 = Field(min_length=2, max_length=100)
+_Radii = Annotated[tuple[Radius, ...], _FROM_2_TO_100]
+_Diameters = Annotated[tuple[Diameter, ...], _FROM_2_TO_100]
 
 
 def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
@@ -39,10 +41,11 @@ _DiameterRange = Annotated[tuple[Diameter, Diameter], AfterValidator(_ascending)
 
 
 class WalkersTable(ConfigTable):
-    """What ``[dimers]`` and ``[[clusters]]`` share: walkers of one make, their number and initial state.
+    """Walkers of one kind: the keys that ``[dimers]`` and ``[[clusters]]`` have in common.
 
-    They face along the drive axis (right, up a slope), against it (left, down), or every other one (both), but for an
-    ``angle``. At the start, forces balance at all contacts. The first of the ``radii`` belongs to the leading bead.
+    They face along the drive axis (right, up a slope), against it (left, down), or in turns along
+    and against it (both); an ``angle`` turns all of them. At the start, forces balance at all
+    contacts. The first of the ``radii`` belongs to the leading bead.
     """
 
     replicates: Whole = key(
@@ -60,7 +63,8 @@ class WalkersTable(ConfigTable):
         "Range of the random factor of the overlap of each walker: 1 ± this.", 0.2, ge=0, lt=1
     )
     spacing: Annotated[Length | None, units.AUTO] = key(
-        "Distance between the walkers. `auto`: they do not meet; with `meet`, they do not touch at the start.",
+        "Distance between the walkers. `auto`: they do not meet; with `meet`, they do not touch "
+        "at the start.",
         None,
     )
     meet: units.Flag = key(
@@ -69,14 +73,14 @@ class WalkersTable(ConfigTable):
 
 
 class Walkers(WalkerGeometry, WalkersTable):
-    """Walkers of one make of a resolved case."""
+    """Walkers of one kind of a resolved case."""
 
     spacing: Length
 
     @property
     def all_radii(self) -> list[float]:
         """Radius of every bead, m."""
-        return [*self.radii] * self.replicates
+        return list(self.radii) * self.replicates
 
 
 class DimersTable(WalkersTable):
@@ -105,15 +109,16 @@ class Dimers(Walkers, DimersTable):
     radii: tuple[Radius, Radius]
 
 
-_THREE = ["0.3 mm", "0.2 mm", "0.2 mm"], ["0.6 mm", "0.4 mm", "0.4 mm"]
-
-
 class ClusterTable(WalkersTable):
-    """One of ``[[clusters]]``: walkers of several beads, in an ``arrangement``, or ``at`` a place for each."""
+    """One of ``[[clusters]]``: walkers of several beads, in an ``arrangement`` or ``at`` places."""
 
     choices: ClassVar = (Choice(("radii",), ("diameters",)), Choice(("arrangement",), ("at",)))
-    radii: _Radii | None = key("Radii of the beads. The first bead leads.", None, _THREE[0])
-    diameters: Indirect[_Diameters] = key("Diameters, instead of `radii`.", None, _THREE[1])
+    radii: _Radii | None = key(
+        "Radii of the beads. The first bead leads.", None, ["0.3 mm", "0.2 mm", "0.2 mm"]
+    )
+    diameters: Indirect[_Diameters] = key(
+        "Diameters, instead of `radii`.", None, ["0.6 mm", "0.4 mm", "0.4 mm"]
+    )
     arrangement: str = key(
         "`chain`, `fan`, `diamond` or `ring`. See [](../cases.md#bodies).", "", "fan"
     )
@@ -125,13 +130,16 @@ class ClusterTable(WalkersTable):
 
 
 class Cluster(Walkers, ClusterTable):
-    """The clusters of one make of a resolved case."""
+    """The clusters of one kind of a resolved case."""
 
     radii: _Radii
 
 
 class MixtureTable(ConfigTable):
-    """``[mixture]``: poured beads of two classes, each of ``sizes`` radii within a range, which occur equally often."""
+    """``[mixture]``: poured beads of two classes.
+
+    Each class has ``sizes`` radii within a range, which are equally frequent.
+    """
 
     choices: ClassVar = (
         Choice(("small",), ("small_diameters",)),
@@ -180,8 +188,8 @@ class Mixture(MixtureTable):
     @cached_property
     def counts(self) -> tuple[int, int]:
         """Numbers of small and of large beads."""
-        few = round(self.count * self.small_share_by_number)
-        return few, self.count - few
+        small_count = round(self.count * self.small_share_by_number)
+        return small_count, self.count - small_count
 
     @property
     def radii(self) -> tuple[float, ...]:
@@ -190,45 +198,88 @@ class Mixture(MixtureTable):
 
     @property
     def bridged(self) -> list[tuple[float, list[float]]]:
-        """A large bead beside a small one.
+        """Radius of a bead and radii of the beads that touch it, m: largest beside smallest.
 
-        Beads of a pile have more neighbours, and its viscous limit is lower; ``auto``'s share of the limit allows for
-        it: a glycerol pile at 0.4 of it is agitated as at a quarter of that step, within 0.1 %, and at 0.8 it heats up.
+        Beads of a pile have more neighbours than one, so that the viscous limit of their time step
+        is lower. The automatic time step is a share of the limit that allows for it: a glycerol
+        pile at 0.4 of the limit is agitated as at a quarter of that step, within 0.1 %, and heats
+        up at 0.8.
         """
-        large, small = max(self.large_radii), min(self.small_radii)
-        return [(large, [small]), (small, [large])]
+        largest = max(self.large_radii)
+        smallest = min(self.small_radii)
+        return [(largest, [smallest]), (smallest, [largest])]
 
     @property
     def all_radii(self) -> list[float]:
         """Radius of every bead, m: the small ones first."""
-        classes = ((self.small_radii, self.counts[0]), (self.large_radii, self.counts[1]))
-        return [sizes[number % len(sizes)] for sizes, count in classes for number in range(count)]
+        small_count, large_count = self.counts
+        return [*_in_turn(self.small_radii, small_count), *_in_turn(self.large_radii, large_count)]
+
+
+def _in_turn(radii: Sequence[float], count: int) -> list[float]:
+    """Radii of a number of beads, which have the given radii in turn, m."""
+    return [radii[number % len(radii)] for number in range(count)]
 
 
 def middles_of(ends: tuple[float, float], number: int) -> tuple[float, ...]:
-    """The middles of equal shares of a range of radii, m."""
+    """The different middles of equal parts of a range.
+
+    Parameters
+    ----------
+    ends
+        Smallest and largest radius, m.
+    number
+        Number of parts.
+
+    Returns
+    -------
+    tuple of float
+        Radii in m, ascending; a single one if both ends are the same.
+    """
     low, high = ends
-    return tuple(
-        dict.fromkeys(
-            float(f"{low + (high - low) * (k + 0.5) / number:.12g}") for k in range(number)
-        )
-    )
+    middles = []
+    for part in range(number):
+        middle = low + (high - low) * (part + 0.5) / number
+        middles.append(float(f"{middle:.12g}"))
+    return tuple(dict.fromkeys(middles))
 
 
 def share_and_volume(
     table: MixtureTable, small_radii: Sequence[float], large_radii: Sequence[float]
 ) -> tuple[float, float]:
-    """Share of the small beads by number, and the mean volume of a bead, m³, from radii in m."""
-    volumes = [sum(map(bead_volume, radii)) / len(radii) for radii in (small_radii, large_radii)]
+    """Share of the small beads of a mixture, and the mean volume of all beads.
+
+    Parameters
+    ----------
+    table
+        The mixture, with the share of the small beads by mass or by number.
+    small_radii, large_radii
+        Radii of the two classes, m. Within a class, all radii are equally frequent.
+
+    Returns
+    -------
+    share : float
+        Share of the small beads by number.
+    volume : float
+        Mean volume of a bead, m³.
+    """
+    small_volume = _mean_volume(small_radii)
+    large_volume = _mean_volume(large_radii)
     share = table.small_share
     if table.mixed_by == "mass":
-        by_number = [share / volumes[0], (1.0 - share) / volumes[1]]
-        share = by_number[0] / sum(by_number)
-    return share, share * volumes[0] + (1.0 - share) * volumes[1]
+        small_number = share / small_volume
+        large_number = (1.0 - share) / large_volume
+        share = small_number / (small_number + large_number)
+    return share, share * small_volume + (1.0 - share) * large_volume
+
+
+def _mean_volume(radii: Sequence[float]) -> float:
+    """Mean volume of beads of some radii (m), m³."""
+    return sum(bead_volume(radius) for radius in radii) / len(radii)
 
 
 class PlacedBeadTable(ConfigTable):
-    """One of ``[[placed]]``: a bead and where it begins, from the middle of the floor."""
+    """One of ``[[placed]]``: a bead and its place at the start, from the middle of the floor."""
 
     choices: ClassVar = (Choice(("radius",), ("diameter",)),)
     radius: Radius | None = key("Radius of the bead.", None, "0.3 mm")
