@@ -1,6 +1,6 @@
 """Length, time step and sampling of a run: the table ``[run]``.
 
-The values that follow from the whole case are those of `walkers.inputs.resolving.length`.
+Values that follow from the whole case are computed in `walkers.inputs.resolving.length`.
 """
 
 from __future__ import annotations
@@ -15,11 +15,16 @@ from walkers.inputs.units import AUTO, Duration, Number, Whole
 from walkers.rounding import percent
 
 FIRST_ATTEMPTS = (12, 24)
-"""Cycles after which velocities are checked. After 36 hardly any are constant that were not after 24."""
-CONSTANT = 0.002
-"""Share within which the velocities of the halves of a walker's cycles agree where a run ends early: they are constant.
+"""Numbers of cycles after which a run may end early, if its velocities are constant.
 
-`walkers.postprocess.measure.gait.measure_walk` calls a walker steady by a looser criterion.
+After 36 cycles, hardly any velocity is constant that was not after 24.
+"""
+CONSTANT = 0.002
+"""Largest relative difference of the velocities in the two halves of the measured cycles if a
+velocity is constant. If all are, a run ends early.
+
+The criterion by which `walkers.postprocess.measure.gait.measure_walk` calls a walker steady is
+looser.
 """
 _Cycles = Annotated[Whole, Field(ge=2, le=1_000_000)]
 _Samples = Annotated[Whole, Field(ge=1, le=1000)]
@@ -33,8 +38,9 @@ def settling_of(cycles: int) -> int:
 class RunTable(ConfigTable):
     """``[run]``: the time step, the length and the samples of the run.
 
-    Beads are recorded ``samples_per_cycle`` times a cycle, or once in ``cycles_per_sample`` (one of the two is 1),
-    bridges with one of ``samples_per_bridge_sample`` samples. Several segments have a restart file at the end of each.
+    Beads are sampled ``samples_per_cycle`` times a cycle, or once in ``cycles_per_sample`` cycles
+    (one of the two is 1). Bridges are sampled with one of ``samples_per_bridge_sample`` samples of
+    the beads. If the run has several segments, each ends with a restart file.
     """
 
     choices: ClassVar = (
@@ -49,7 +55,8 @@ class RunTable(ConfigTable):
         "Accept a time step beyond a stability limit.", False
     )
     cycles: Annotated[_Cycles | None, AUTO] = key(
-        "Number of drive cycles. `auto`: until velocities are constant. See [](../cases.md#length-of-a-run).",
+        "Number of drive cycles. `auto`: until velocities are constant. "
+        "See [](../cases.md#length-of-a-run).",
         None,
         60,
     )
@@ -76,7 +83,8 @@ class RunTable(ConfigTable):
         "Samples of the beads per cycle. Default: 20.", None, 20
     )
     bridge_samples_per_cycle: Indirect[_Samples] = key(
-        "Samples of the bridges per cycle, a divisor of `samples_per_cycle`. Default: 1; loose beads: all.",
+        "Samples of the bridges per cycle, a divisor of `samples_per_cycle`. "
+        "Default: 1; loose beads: all.",
         None,
         1,
     )
@@ -88,7 +96,8 @@ class RunTable(ConfigTable):
         le=1e6,
     )
     segment: Indirect[Duration] = key(
-        "Length of a segment; a run can continue after a complete segment. Default for loose beads: 0.5 s.",
+        "Length of a segment; a run can continue after a complete segment. "
+        "Default for loose beads: 0.5 s.",
         None,
     )
     settled_below: units.Speed | None = key(
@@ -108,7 +117,24 @@ class RunTable(ConfigTable):
 class RunSettings(RunTable):
     """The run of a resolved case.
 
-    A case whose beads do not rest before the drive has no values of ``settled_below`` and ``longest_settling``.
+    If its beads do not rest before the drive, ``settled_below`` and ``longest_settling`` are None.
+
+    Attributes
+    ----------
+    steps_per_cycle : int
+        Time steps in a cycle of the drive.
+    until_steady : bool
+        Whether the run ends early if velocities are constant; then ``cycles`` is an upper limit.
+    cycles_per_sample : int
+        Cycles between two samples of the beads; 1 if a cycle has several samples.
+    samples_per_bridge_sample : int
+        Samples of the beads for each sample of the bridges.
+    cycles_per_segment : int
+        Cycles in a segment of the run.
+
+    Notes
+    -----
+    The other fields are keys of ``[run]``.
     """
 
     time_step: units.Time
@@ -138,24 +164,31 @@ class RunSettings(RunTable):
 
     @property
     def settled_strobes(self) -> int:
-        """Number of stroboscopic samples before velocities are measured."""
+        """Number of stroboscopic samples before velocities are measured, rounded up."""
         return -(-self.settling_cycles // self.cycles_per_sample)
 
     @property
     def attempts(self) -> tuple[int, ...]:
-        """Cycles for which the run is made, and made again from its begin if its walkers are not steady after them."""
-        fewer = FIRST_ATTEMPTS if self.until_steady else ()
-        return (*(cycles for cycles in fewer if cycles < self.cycles), self.cycles)
+        """Numbers of cycles of the attempts at the run, ascending.
+
+        If velocities are not constant after one attempt, the next one starts again from the start.
+        """
+        if not self.until_steady:
+            return (self.cycles,)
+        shorter = [cycles for cycles in FIRST_ATTEMPTS if cycles < self.cycles]
+        return (*shorter, self.cycles)
 
     @property
     def continuation(self) -> str:
-        """How `walkers run` continues after the first attempt, as text; empty for a fixed number of cycles."""
-        constant, most = f"the velocities are not constant within {percent(CONSTANT)}", self.cycles
-        further = f"walkers run continues to {most} if {constant}: then set cycles to {most}"
-        return further if len(self.attempts) > 1 else ""
+        """How `walkers run` continues after the first attempt, as text; empty if it does not."""
+        if len(self.attempts) == 1:
+            return ""
+        condition = f"the velocities are not constant within {percent(CONSTANT)}"
+        most = self.cycles
+        return f"walkers run continues to {most} if {condition}: then set cycles to {most}"
 
     def steps_until(self, cycles: int) -> int:
-        """Steps of the attempts up to the one for so many cycles."""
+        """Steps of all attempts up to the one with a number of cycles."""
         return self.steps_per_cycle * sum(attempt for attempt in self.attempts if attempt <= cycles)
 
     @property
