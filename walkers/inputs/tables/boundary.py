@@ -1,4 +1,7 @@
-"""``[boundary]`` of a case file; what a shape is and does is in `walkers.inputs.tables.shapes`."""
+"""The table ``[boundary]`` of a case file.
+
+What follows from a shape is computed in `walkers.inputs.tables.shapes`.
+"""
 
 from __future__ import annotations
 
@@ -27,15 +30,24 @@ from walkers.inputs.tables.shapes.vessel import GIVEN_BY, Plane, VesselShape
 from walkers.inputs.tables.shapes.walls import Wall
 
 _SLOPE = f'{units.NOT_NEGATIVE}; boundary.uphill = "180 deg" turns the slope'
-_LEAST = 1e-13
+"""What a message expects of a tilt."""
+_ROUNDING_ERROR = 1e-13
+"""Sines and cosines below this are zero."""
 _SIZES = ("opening", "width", "height")
+"""Keys of the sizes of all shapes."""
+_VESSEL_KEYS = ("mesh", "planes", "scale")
+"""Keys that only vessels of the user's own have, which therefore imply this shape."""
+_Opening = Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)]
+_Tilt = Annotated[float, replace(units.ANGLE, largest=1.5708, sign=_SLOPE)]
 
 
 class Boundary(ConfigTable):
     """``[boundary]``: the walls.
 
-    A groove is two walls that meet in the x axis; a container is open above, its floor about the origin. A plane at 90°
-    is a wall. ``uphill`` of a file is from the direction of the drive, of a resolved case from its x axis toward y.
+    A groove consists of two walls that meet in the x axis. A container is open at the top, and the
+    origin is the middle of its floor. A plane that is tilted by 90° is a wall. The angle ``uphill``
+    of a file starts from the direction of the drive, that of a resolved case from the x axis toward
+    y.
     """
 
     shape: ShapeName = key("Shape of the boundary. See [](../cases.md#boundaries).", "plane")
@@ -44,10 +56,7 @@ class Boundary(ConfigTable):
         ...,
         "glass",
     )
-    opening: (
-        Annotated[float, replace(units.ANGLE, smallest=0.5, largest=3.1, sign=units.POSITIVE)]
-        | None
-    ) = key("Angle between the two walls of a groove.", None, "120 deg")
+    opening: _Opening | None = key("Angle between the two walls of a groove.", None, "120 deg")
     width: units.Length | None = key(
         "Width of a channel; inner side or diameter of a container.", None, "5.3 mm"
     )
@@ -55,7 +64,8 @@ class Boundary(ConfigTable):
         "Height of a container. Beads are lost above twice this height.", None, "5.3 mm"
     )
     mesh: Indirect[str] = key(
-        "File of a vessel of your own: its inner surface, or a solid, as STL, OBJ, PLY, VTP or in another format.",
+        "File of a vessel of your own: its inner surface, or a solid, as STL, OBJ, PLY, VTP "
+        "or in another format.",
         None,
         "funnel.stl",
     )
@@ -65,7 +75,7 @@ class Boundary(ConfigTable):
     )
     points: Derived[tuple[Vector, ...]] = ()
     triangles: Derived[tuple[tuple[int, int, int], ...]] = ()
-    tilt: Annotated[float, replace(units.ANGLE, largest=1.5708, sign=_SLOPE)] = key(
+    tilt: _Tilt = key(
         'Tilt of the floor: 0° is level, 90° is a wall. `uphill = "180 deg"` turns the slope.', 0.0
     )
     uphill: units.Angle = key(
@@ -74,17 +84,21 @@ class Boundary(ConfigTable):
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
-        """Sizes that the shape lacks, and sizes of other shapes."""
-        named = next((name for name in ("mesh", "planes", "scale") if name in given), "")
-        shape = str(given.get("shape", "vessel" if named else "plane"))
+        """Sizes that the shape lacks, sizes of other shapes, and contradictions of a vessel."""
+        vessel_keys = [name for name in _VESSEL_KEYS if name in given]
+        default = "vessel" if vessel_keys else "plane"
+        shape = str(given.get("shape", default))
         if shape == "vessel":
             yield from cls.problems_of(GIVEN_BY, given, place)
-        elif named:
-            yield Problem(key_within(place, "shape"), None, f"expected none beside {place}.{named}")
+        elif vessel_keys:
+            expected = f"expected none beside {place}.{vessel_keys[0]}"
+            yield Problem(key_within(place, "shape"), None, expected)
             return
         if shape not in SHAPES:
             return
-        sizes = ("height",) if "planes" in given else SHAPES[shape].sizes
+        sizes = SHAPES[shape].sizes
+        if "planes" in given:
+            sizes = ("height",)
         for name in _SIZES:
             if name in sizes and name not in given:
                 yield cls.missing(name, place)
@@ -93,7 +107,7 @@ class Boundary(ConfigTable):
 
     @property
     def geometry(self) -> Shape:
-        """The shape with its sizes."""
+        """The shape with its sizes, which answers what depends on the form of the boundary."""
         return _geometry_of(self)
 
     @property
@@ -123,7 +137,7 @@ class Boundary(ConfigTable):
 
     @property
     def vessel(self) -> Vessel:
-        """The surface of a vessel of the user's own; raises `ValueError` for other shapes."""
+        """The surface of a vessel of the user's own; other shapes raise `ValueError`."""
         geometry = self.geometry
         if not isinstance(geometry, VesselShape):
             raise ValueError(f"a {self.shape} is no vessel")
@@ -132,19 +146,30 @@ class Boundary(ConfigTable):
     @property
     def tilted(self) -> str:
         """The tilt as text: ``plane tilted by 60°``; empty if level."""
-        return f"{self.shape} tilted by {degrees(self.tilt):.4g}°" if self.tilt else ""
+        if self.tilt == 0.0:
+            return ""
+        return f"{self.shape} tilted by {degrees(self.tilt):.4g}°"
 
     def gravity(self, gravity: float) -> Vector:
-        """The acceleration of gravity in the boundary's frame, m/s², of a magnitude (m/s²)."""
-        down, press = gravity * _round(sin(self.tilt)), gravity * _round(cos(self.tilt))
-        return (-down * _round(cos(self.uphill)), -down * _round(sin(self.uphill)), -press)
+        """The acceleration of gravity in the frame of the boundary, m/s², of a magnitude (m/s²)."""
+        along_slope = gravity * _without_rounding_error(sin(self.tilt))
+        normal = gravity * _without_rounding_error(cos(self.tilt))
+        x = -along_slope * _without_rounding_error(cos(self.uphill))
+        y = -along_slope * _without_rounding_error(sin(self.uphill))
+        return (x, y, -normal)
 
 
 @lru_cache(maxsize=16)  # the surface of a mesh takes seconds
 def _geometry_of(boundary: Boundary) -> Shape:
+    """The shape of a boundary with its sizes."""
     return SHAPES[boundary.shape].from_table(boundary)
 
 
-def _round(value: float) -> float:
-    """A value, or zero if only rounding makes it differ: gravity along a wall has no normal part."""
-    return 0.0 if abs(value) < _LEAST else value
+def _without_rounding_error(value: float) -> float:
+    """A sine or cosine, or zero if only rounding makes a difference.
+
+    Gravity has no component normal to a vertical wall, although cos(π/2) is 6e-17.
+    """
+    if abs(value) < _ROUNDING_ERROR:
+        return 0.0
+    return value
