@@ -213,7 +213,7 @@ VESSELS: list[tuple[str | None, dict[str, Any], dict[str, Any], str]] = [
     (obj([(0.0, 0.0, 0.0)] * 8, OPEN_BOX), OF_MESH, {}, "has no triangles of any size"),
     (obj(SQUARE, OPEN_BOX), {"mesh": "own.obj"}, {}, 'boundary.scale: missing; expected a value such as "1 mm"'),
     (obj(SQUARE, OPEN_BOX), {**OF_MESH, "shape": "box"}, {}, "expected none beside boundary.mesh"),
-    (obj(SQUARE, OPEN_BOX), {**OF_MESH, "height": "3 mm"}, {}, 'boundary.height = "3 mm": expected none of a vessel'),
+    (obj(SQUARE, OPEN_BOX), {**OF_MESH, "height": "3 mm"}, {}, 'boundary.height = "3 mm": expected none for a vessel'),
     (obj(SQUARE, SIDES), OF_MESH, {}, "has 2 openings, the lowest at (-2, -2, 0) mm; expected one, at its top"),
     (obj(FLIPPED, OPEN_BOX), OF_MESH, {}, "is open at its lowest point, at (-2, 2, -4) mm; expected a closed"),
     (obj(SQUARE[:2] + SQUARE[4:6] + [(0.0, 3.0, 1.0), (0.0, 3.0, 3.0)],

@@ -103,7 +103,7 @@ class Boundary(ConfigTable):
             if name in sizes and name not in given:
                 yield cls.missing(name, place)
             elif name in given and name not in sizes:
-                yield Problem(key_within(place, name), None, f"expected none of a {shape}")
+                yield Problem(key_within(place, name), None, f"expected none for a {shape}")
 
     @property
     def geometry(self) -> Shape:
@@ -140,7 +140,7 @@ class Boundary(ConfigTable):
         """The surface of a vessel of the user's own; other shapes raise `ValueError`."""
         geometry = self.geometry
         if not isinstance(geometry, VesselShape):
-            raise ValueError(f"a {self.shape} is no vessel")
+            raise ValueError(f"a {self.shape} is not a vessel")
         return geometry.vessel
 
     @property

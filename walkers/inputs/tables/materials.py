@@ -1,4 +1,7 @@
-"""Materials, liquid and contacts of a case, and gravity."""
+"""Materials, liquid and contacts of a case, and gravity.
+
+`walkers.inputs.resolving.from_library` looks up the values of these tables that are in the library.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from walkers.inputs.units import Coefficient, Number
 from walkers.physics.capillary import DEFAULT_LAW, BridgeLiquid
 
 STIFFEST = 1e11
-"""Largest Young's modulus of the contacts of a case, Pa: as hard as glass or steel; runs take a day."""
+"""Largest Young's modulus of contacts, Pa: that of glass or steel, with which a run takes a day."""
 _SOFTENED = Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFEST)]
 
 
@@ -55,31 +58,37 @@ class LiquidTable(ConfigTable):
         le=0.5,
     )
     meniscus_radius: units.Length | None = key(
-        "Radius of the menisci of all bridges, which exchange liquid through the film on a wetted plate.",
+        "Radius of the menisci of all bridges, which exchange liquid through the film "
+        "on a wetted substrate.",
         None,
         "70 um",
     )
     viscosity_ratio: Number = key(
-        "Factor of the viscosity of the bridges. It scales their drag.", 1.0, ge=0, le=1e4
+        "Factor of the viscosity of the bridges. It scales their viscous forces.", 1.0, ge=0, le=1e4
     )
     contact_angle: units.UpToRightAngle = key(
-        "Contact angle at every bridge. A case whose bridges push the beads of a walker apart at rest is refused."
+        "Contact angle at every bridge. A case whose bridges push the beads of a walker apart "
+        "at rest is refused."
     )
     conserved: units.Flag = key(
-        "Whether bridges take their liquid from the films of their beads, and give it back. For piles.",
+        "Whether bridges take their liquid from the films of their beads, and give it back. "
+        "For piles.",
         False,
     )
     law: str = key("Law of the bridges. See [](../../how-to/bridge-law.md).", DEFAULT_LAW)
 
 
 class Liquid(LiquidTable):
-    """The liquid of a resolved case; its bridges have either a ``volume_fraction`` or a ``meniscus_radius``."""
+    """The liquid of a resolved case.
+
+    It has either a ``volume_fraction`` or a ``meniscus_radius``.
+    """
 
     dynamic_viscosity: units.DynamicViscosity
 
     @cached_property
     def of_bridges(self) -> BridgeLiquid:
-        """What the bridges' law and their tables need of it."""
+        """The properties of the liquid on which the forces of bridges depend, in SI units."""
         return BridgeLiquid(
             surface_tension=self.surface_tension,
             viscosity=float(f"{self.dynamic_viscosity * self.viscosity_ratio:.15g}"),
@@ -101,10 +110,10 @@ class Friction(ConfigTable):
 
 
 class Roughness(ConfigTable):
-    """``[contact.roughness]``: gap that remains for the liquid between surfaces that touch at their asperities."""
+    """``[contact.roughness]``: the gap for liquid between surfaces whose asperities touch."""
 
     bead_bead: units.Length = key(
-        "Roughness of a contact of two beads: the root of both squares.", example="30 nm"
+        "Roughness of a contact of two beads: the root of the sum of both squares.", example="30 nm"
     )
     bead_wall: units.Length = key(
         "Roughness of a contact of a bead and the boundary.", example="30 nm"
@@ -112,10 +121,10 @@ class Roughness(ConfigTable):
 
 
 class ContactTable(ConfigTable):
-    """``[contact]``: the model of the contacts, with the Young's modulus of softened beads and walls.
+    """``[contact]``: the model of the contacts, whose Young's modulus is that of softened bodies.
 
-    The modulus of ``"auto"`` is 50 MPa for loose beads; for walkers it is the lowest of 50, 200, 800, ... MPa at which
-    bridges hardly delay the contacts (`walkers.inputs.resolving.loads.delay`).
+    An automatic modulus is 50 MPa for loose beads. For walkers it is the lowest of 50, 200, 800, …
+    MPa at which bridges hardly delay the contacts (`walkers.inputs.resolving.loads.delay`).
     """
 
     friction: Friction = key("")
@@ -127,7 +136,8 @@ class ContactTable(ConfigTable):
         "Coefficient of restitution of the dry contact.", example=0.5, gt=0.05, le=1
     )
     youngs_modulus: Annotated[_SOFTENED | None, units.AUTO] = key(
-        "Young's modulus of beads and boundary: lower than the real one, so that the time step can be longer.",
+        "Young's modulus of beads and boundary: lower than the real one, so that the time step "
+        "can be longer.",
         None,
     )
     poissons_ratio: Number = key("Poisson's ratio.", 0.3, ge=0, lt=0.5)
@@ -140,7 +150,7 @@ class Contact(ContactTable):
 
 
 class Environment(ConfigTable):
-    """``[environment]``."""
+    """``[environment]``: gravity."""
 
     gravity: Annotated[float, replace(units.ACCELERATION, example="9.81 m/s^2")] = key(
         "Acceleration of gravity.", 9.81
