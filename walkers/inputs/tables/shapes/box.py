@@ -11,7 +11,7 @@ from walkers.inputs.tables.shapes.shape import upright_walls
 from walkers.inputs.tables.shapes.walls import BOTTOM, Wall
 
 FOUR_SIDES = {"-x": (1.0, 0.0), "+x": (-1.0, 0.0), **ACROSS}
-"""x and y of the normals of the sides."""
+"""x and y of the normals of the sides, by their names."""
 
 
 @dataclass(frozen=True)

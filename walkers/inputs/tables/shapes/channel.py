@@ -10,12 +10,18 @@ from walkers.inputs.tables.shapes.shape import Shape, damping_between, upright_w
 from walkers.inputs.tables.shapes.walls import BOTTOM, Wall
 
 ACROSS = {"-y": (0.0, 1.0), "+y": (0.0, -1.0)}
-"""x and y of the normals of the walls across the y axis."""
+"""x and y of the normals of the walls that stand across the y axis, by their names."""
 
 
 @dataclass(frozen=True)
 class ChannelShape(Shape):
-    """A floor between two upright walls along x, ``width`` (m) apart."""
+    """A floor between two upright walls along x.
+
+    Attributes
+    ----------
+    width : float
+        Distance of the walls, m.
+    """
 
     name: ClassVar[str] = "channel"
     sizes: ClassVar[tuple[str, ...]] = ("width",)
@@ -40,7 +46,11 @@ class ChannelShape(Shape):
         margin: float,
         largest: float,
     ) -> tuple[Vector, Vector]:
-        """The simulation box (see `Shape.simulation_box`), as wide as the channel and at least as high."""
-        (x, _, below), (_, _, top) = super().simulation_box(half_x, half_y, height, margin, largest)
+        """The simulation box (see `Shape.simulation_box`).
+
+        It is as wide as the channel with a margin, and at least as high as the channel is wide.
+        """
+        low, high = super().simulation_box(half_x, half_y, height, margin, largest)
         y = self.width / 2.0 + margin
-        return (x, -y, below), (-x, y, max(top, self.width))
+        top = max(high[2], self.width)
+        return (low[0], -y, low[2]), (high[0], y, top)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import count as numbers_from
-from math import ceil, inf
+from dataclasses import dataclass, replace
+from itertools import count as count_from
+from itertools import product
+from math import ceil
 from typing import ClassVar
 
 import numpy as np
@@ -15,21 +16,35 @@ from walkers.errors import key_error
 from walkers.inputs.tables.shapes.shape import LOOSE, Layer, Shape, damping_between
 
 NEAREST = (1.0 - 1e-9) * LOOSE
-"""Smallest distance of a place from the walls, in radii of the largest bead."""
+"""Smallest distance of a place from the walls, in radii of the largest bead.
+
+The factor below one is for rounding errors of places next to a wall."""
 _RIM = 2e-4
-"""m; the simulation box reaches this far beyond the walls."""
-_BEYOND = 1.01
-"""Extent of pictures over the width: the edges of the prism of a cylinder lie beyond the wall."""
+"""Distance from the walls to the sides of the simulation box, m."""
+_DRAWN_WIDTH = 1.01
+"""Width in which walls are drawn, in widths of the container.
+
+It is above one because the edges of the prism that is drawn for a cylinder lie beyond its wall."""
 
 
 @dataclass(frozen=True)
 class Container(Shape):
-    """A prism about the z axis, open above. Walls and simulation go on up to twice its height."""
+    """A prism about the z axis that is open at the top.
+
+    The walls and the simulation box end at twice its height.
+
+    Attributes
+    ----------
+    width : float
+        Distance of opposite sides, or diameter, m.
+    height : float
+        Height of the rim, m.
+    """
 
     sizes: ClassVar[tuple[str, ...]] = ("width", "height")
     closed: ClassVar[bool] = True
     area: ClassVar[float]
-    """Cross-section over the square of the width."""
+    """Cross-section in squares of the width."""
     tight: ClassVar[bool] = True
     """See `Layer.tight`."""
 
@@ -57,36 +72,40 @@ class Container(Shape):
         margin: float,  # noqa: ARG002
         largest: float,
     ) -> tuple[Vector, Vector]:
-        """The simulation box (see `Shape.simulation_box`): the container and as much room above it."""
+        """The simulation box (see `Shape.simulation_box`), twice as high as the container."""
         half = self.width / 2.0 + _RIM
         return (-half, -half, -4.0 * largest), (half, half, 2.0 * self.height)
 
     def outline(self, low: FloatArray, high: FloatArray, inside: FloatArray) -> list[FloatArray]:
         """Polygons of the walls in pictures (see `Shape.outline`), which end at the rim."""
-        half = _BEYOND * self.width / 2.0
-        low, high = np.full(3, -half), np.array([half, half, self.height])
+        half = _DRAWN_WIDTH * self.width / 2.0
+        low = np.full(3, -half)
+        high = np.array([half, half, self.height])
         inside = np.array([0.0, 0.0, self.height / 2.0])
         return super().outline(low, high, inside)
 
     def layer(self, largest: float) -> Layer:
-        """A square lattice of places for beads up to a radius (m), without those that walls cut."""
-        across = int(self.width / (2.0 * LOOSE * largest))
-        pitch = self.width / max(across, 1)
-        line = [(index + 0.5) * pitch - self.width / 2.0 for index in range(across)]
-        square = [(x, y) for x in line for y in line]
-        clearances = self.side_clearance(np.array([(x, y, 0.0) for x, y in square]).reshape(-1, 3))
-        free = clearances > NEAREST * largest
-        places = [place for place, is_free in zip(square, free, strict=True) if is_free]
-        return Layer(places, pitch, self.tight)
+        """A square lattice of places for beads up to a radius (m), without those close to walls."""
+        columns = int(self.width / (2.0 * LOOSE * largest))
+        pitch = self.width / max(columns, 1)
+        line = [(column + 0.5) * pitch - self.width / 2.0 for column in range(columns)]
+        lattice = list(product(line, line))
+        on_floor = np.array([(x, y, 0.0) for x, y in lattice]).reshape(-1, 3)
+        clearances = self.side_clearance(on_floor)
+        places = []
+        for place, clearance in zip(lattice, clearances, strict=True):
+            if clearance > NEAREST * largest:
+                places.append(place)
+        return Layer(places=places, pitch=pitch, tight=self.tight)
 
-    def layers(self, largest: float, floor: float) -> Iterator[Layer]:  # noqa: ARG002
-        """The same layer (`layer`) again and again, one upon the other, without end."""
+    def layers(self, largest: float, bodies_top: float) -> Iterator[Layer]:  # noqa: ARG002
+        """Endlessly many equal layers (`layer`), one above the other (see `Shape.layers`)."""
         layer = self.layer(largest)
-        for number in numbers_from():
+        for number in count_from():
             # In this order: another one changes the last digit of heights, and piles are chaotic.
-            yield layer._replace(level=(number + 0.5) * 2.0 * LOOSE * largest)
+            yield replace(layer, level=(number + 0.5) * 2.0 * LOOSE * largest)
 
-    def check_pour(self, count: int, largest: float, floor: float) -> None:
+    def check_pour(self, count: int, largest: float, bodies_top: float) -> None:
         """Raise `InputError` unless the beads fit (see `Shape.check_pour`)."""
         if self.width < 4.0 * largest:
             expected = "expected at least two of the large beads side by side"
@@ -95,10 +114,12 @@ class Container(Shape):
         if layer.tight and self.width < 8.0 * largest:
             expected = "expected at least four of the large beads side by side"
             raise key_error("boundary.width", expected)
-        layers = -(-count // len(layer.places)) if layer.places else inf
-        level = floor + layers * 2.0 * LOOSE * largest
-        if level > 2.0 * self.height:  # walls and simulation go on to there
+        if not layer.places:
             expected = "expected a wider boundary"
-            if layer.places:
-                expected = f"expected {ceil(level / 2.0 * 1e5) / 100.0:g} mm or more"
+            raise key_error("boundary.height", f"too low for {count} beads; {expected}")
+        layers = ceil(count / len(layer.places))
+        level = bodies_top + layers * 2.0 * LOOSE * largest
+        if level > 2.0 * self.height:  # where the walls and the simulation box end
+            sufficient = ceil(level / 2.0 * 1e5) / 100.0
+            expected = f"expected {sufficient:g} mm or more"
             raise key_error("boundary.height", f"too low for {count} beads; {expected}")

@@ -20,4 +20,4 @@ class CylinderShape(Container):
     @property
     def walls(self) -> tuple[Wall, ...]:
         """The floor and the round side."""
-        return BOTTOM, Round(self.width / 2.0)
+        return (BOTTOM, Round(radius=self.width / 2.0))

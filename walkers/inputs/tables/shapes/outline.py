@@ -1,4 +1,4 @@
-"""Polygons of walls in pictures."""
+"""Polygons of walls in pictures, computed from the planes of the walls; nothing is drawn here."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def faces_within(
     high: FloatArray,
     inside: FloatArray,
 ) -> list[FloatArray]:
-    """The parts of walls that bound the convex room around a place.
+    """The parts of walls that bound the convex region around a place.
 
     Parameters
     ----------
@@ -34,16 +34,33 @@ def faces_within(
     """
     from scipy.spatial import HalfspaceIntersection
 
-    planes = [wall.tangent_planes() for wall in walls]
-    points = np.concatenate([*(points for points, _ in planes), np.repeat([low, high], 3, axis=0)])
-    normals = np.concatenate([*(normals for _, normals in planes), np.eye(3), -np.eye(3)])
-    spaces = np.column_stack([-normals, np.einsum("px,px->p", normals, points)])
-    room = HalfspaceIntersection(spaces, inside)
+    point_arrays = []
+    normal_arrays = []
+    for wall in walls:
+        wall_points, wall_normals = wall.tangent_planes()
+        point_arrays.append(wall_points)
+        normal_arrays.append(wall_normals)
+    box_points = np.repeat([low, high], 3, axis=0)
+    points = np.concatenate([*point_arrays, box_points])
+    normals = np.concatenate([*normal_arrays, np.eye(3), -np.eye(3)])
+
+    # A half-space is a row (-n, n·p) for the normal n and a point p: -n·x + n·p ≤ 0 in front of it.
+    half_spaces = np.column_stack([-normals, np.einsum("px,px->p", normals, points)])
+    region = HalfspaceIntersection(half_spaces, inside)
+
     faces = []
-    for number, normal in enumerate(normals[:-6]):
-        corners = room.intersections[[number in meeting for meeting in room.dual_facets]]
+    for number, normal in enumerate(normals[: -len(box_points)]):
+        on_plane = [number in planes for planes in region.dual_facets]
+        corners = region.intersections[on_plane]
         if len(corners) > 2:
-            spokes = corners - corners.mean(axis=0)
-            turns = np.arctan2(spokes @ np.cross(normal, spokes[0]), spokes @ spokes[0])
-            faces.append(corners[np.argsort(turns)])
+            faces.append(_counterclockwise(corners, normal))
     return faces
+
+
+def _counterclockwise(corners: FloatArray, normal: FloatArray) -> FloatArray:
+    """Corners of a convex polygon (K, 3) in their order about its normal (3,)."""
+    spokes = corners - corners.mean(axis=0)
+    across = np.cross(normal, spokes[0])
+    angles = np.arctan2(spokes @ across, spokes @ spokes[0])
+    ordered: FloatArray = corners[np.argsort(angles)]
+    return ordered

@@ -30,6 +30,6 @@ class PlaneShape(Shape):
         margin: float,
         largest: float,
     ) -> tuple[Vector, Vector]:
-        """The simulation box (see `Shape.simulation_box`), which reaches one margin below the floor."""
-        (x, y, _), high = super().simulation_box(half_x, half_y, height, margin, largest)
-        return (x, y, -margin), high
+        """The simulation box (see `Shape.simulation_box`), from one margin below the floor."""
+        low, high = super().simulation_box(half_x, half_y, height, margin, largest)
+        return (low[0], low[1], -margin), high

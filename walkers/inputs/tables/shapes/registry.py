@@ -1,4 +1,7 @@
-"""The shapes that a case file can name. A new one is a module in this folder and an entry here."""
+"""The shapes that a case file can name.
+
+A new shape is a module in this folder and an entry here.
+"""
 
 from __future__ import annotations
 

@@ -24,7 +24,9 @@ from walkers.inputs.tables.shapes.walls import Flat, Wall
 GIVEN_BY = Choice(("mesh", "scale"), ("planes", "height"))
 """Keys that describe a vessel."""
 _PLACES_AT_ONCE = 5000
-"""Places from which beads are poured whose distances from the walls are computed together."""
+"""Largest number of places whose distances from the walls are computed together.
+
+It limits memory, and a search for places can end early."""
 
 
 class Plane(ConfigTable):
@@ -38,7 +40,19 @@ class Plane(ConfigTable):
 
 @dataclass(frozen=True)
 class VesselShape(Container):
-    """A vessel of planes. ``width`` (m) is twice its extent from the origin along x or y."""
+    """A vessel of planes.
+
+    Attributes
+    ----------
+    width : float
+        Twice the largest extent from the origin along x or y, m.
+    height : float
+        Height of the rim, m.
+    planes : tuple of Plane
+        The planes; empty for a mesh.
+    points, triangles : tuple of tuple
+        Corners (m) and triangles of a mesh; empty for planes.
+    """
 
     name: ClassVar[str] = "vessel"
     sizes: ClassVar[tuple[str, ...]] = ()
@@ -49,24 +63,27 @@ class VesselShape(Container):
 
     @classmethod
     def from_table(cls, table: Any) -> Self:
-        """The vessel of a table with the keys of ``[boundary]``, of facets if it has triangles."""
+        """The vessel of a table with the keys of ``[boundary]``: of a mesh if it has triangles."""
         if table.triangles and cls is VesselShape:
             return MeshVesselShape.from_table(table)  # type: ignore[return-value]
         return super().from_table(table)
 
     @cached_property
     def vessel(self) -> Vessel:
-        """Its surface."""
-        return vessel_between([(plane.point, plane.normal) for plane in self.planes], self.height)
+        """The surface of the vessel."""
+        planes = [(plane.point, plane.normal) for plane in self.planes]
+        return vessel_between(planes, self.height)
 
     @cached_property
     def walls(self) -> tuple[Wall, ...]:
         """The planes; the first one is the floor if it is level and goes through the origin."""
         first = self.planes[0]
-        level = first.normal[2] > 1.0 - 1e-12 and abs(first.point[2]) < 1e-9
-        names = names_of_faces([plane.normal for plane in self.planes], floor=level)
-        named = zip(self.planes, names, strict=True)
-        return tuple(Flat(plane.point, plane.normal, name) for plane, name in named)
+        first_is_floor = first.normal[2] > 1.0 - 1e-12 and abs(first.point[2]) < 1e-9
+        names = names_of_faces([plane.normal for plane in self.planes], floor=first_is_floor)
+        walls = []
+        for plane, name in zip(self.planes, names, strict=True):
+            walls.append(Flat(point=plane.point, normal=plane.normal, name=name))
+        return tuple(walls)
 
     @property
     def cross_section(self) -> float:
@@ -84,50 +101,57 @@ class VesselShape(Container):
         inside: FloatArray,  # noqa: ARG002
     ) -> list[FloatArray]:
         """The triangles of the surface, arrays of shape (3, 3), m."""
-        return [*self.vessel.points[self.vessel.triangles]]
+        return list(self.vessel.points[self.vessel.triangles])
 
-    def layers(self, largest: float, floor: float) -> Iterator[Layer]:
-        """Layers up to twice the height of the vessel (see `Container.layers`), wide ones in strips."""
+    def layers(self, largest: float, bodies_top: float) -> Iterator[Layer]:
+        """Layers up to twice the height of the vessel (see `Shape.layers`).
+
+        A layer with many places comes in several strips along x, which have the same level.
+        """
         pitch = 2.0 * LOOSE * largest
         columns = ceil(self.width / pitch)
         line = pitch * (np.arange(columns) - (columns - 1) / 2.0)
         rows_at_once = max(1, _PLACES_AT_ONCE // columns)
-        levels = (np.arange(max(int((2.0 * self.height - floor) / pitch), 0)) + 0.5) * pitch
+        layer_count = max(int((2.0 * self.height - bodies_top) / pitch), 0)
+        levels = (np.arange(layer_count) + 0.5) * pitch
         for level in levels.tolist():
             for first in range(0, columns, rows_at_once):
                 strip = line[first : first + rows_at_once]
-                places = np.stack(np.meshgrid(line, strip, [floor + level]), axis=-1).reshape(-1, 3)
-                clear = np.minimum(self.side_clearance(places), places[:, 2])
-                free = places[clear > NEAREST * largest]
+                grid = np.meshgrid(line, strip, [bodies_top + level])
+                places = np.stack(grid, axis=-1).reshape(-1, 3)
+                # A floor is not a side wall; the distance of places from it is their height.
+                clearances = np.minimum(self.side_clearance(places), places[:, 2])
+                free = places[clearances > NEAREST * largest]
                 if len(free):
-                    yield Layer([(x, y) for x, y, _ in free.tolist()], pitch, True, level)
+                    x_and_y = [(x, y) for x, y, _ in free.tolist()]
+                    yield Layer(places=x_and_y, pitch=pitch, tight=True, level=level)
 
-    def check_pour(self, count: int, largest: float, floor: float) -> None:
-        """Raise `InputError` unless the beads fit (see `Container.check_pour`); stops when they do."""
-        room = 0
-        for layer in self.layers(largest, floor):
-            room += len(layer.places)
-            if room >= count:
+    def check_pour(self, count: int, largest: float, bodies_top: float) -> None:
+        """Raise `InputError` unless the beads fit (see `Shape.check_pour`)."""
+        place_count = 0
+        for layer in self.layers(largest, bodies_top):
+            place_count += len(layer.places)
+            if place_count >= count:
                 return
-        upto = f"up to twice its height of {1e3 * self.height:.4g} mm"
-        if room:
-            fits = f"the vessel has places for {room} beads to be poured from, {upto}"
-            raise key_error("mixture.count", f"{fits}; expected at most {room}")
-        across = f"{2e3 * largest:.4g} mm"
-        none = f"the vessel has no place to pour a bead of {across} from, {upto}"
-        cure = "expected a larger vessel (boundary.scale) or smaller beads"
+        limit = f"up to twice its height of {1e3 * self.height:.4g} mm"
+        if place_count:
+            actual = f"the vessel has places for {place_count} beads to be poured from, {limit}"
+            raise key_error("mixture.count", f"{actual}; expected at most {place_count}")
+        diameter = f"{2e3 * largest:.4g} mm"
+        actual = f"the vessel has no place to pour a bead of {diameter} from, {limit}"
+        expected = "expected a larger vessel (boundary.scale) or smaller beads"
         if not self.vessel.rims:
-            cure += ", or a vessel that is open at its top"
-        raise key_error("mixture.count", f"{none}; {cure}")
+            expected += ", or a vessel that is open at its top"
+        raise key_error("mixture.count", f"{actual}; {expected}")
 
 
 @dataclass(frozen=True)
 class MeshVesselShape(VesselShape):
-    """A vessel of triangles, where planes cannot describe the surface. Its walls are facets."""
+    """A vessel of triangles, for a surface that planes cannot describe. Its walls are facets."""
 
     @cached_property
     def vessel(self) -> Vessel:
-        """Its surface."""
+        """The surface of the vessel."""
         return Vessel(np.array(self.points), np.array(self.triangles))
 
     @cached_property
@@ -136,9 +160,9 @@ class MeshVesselShape(VesselShape):
         return self.vessel.facets
 
     def damping(self, radius: float) -> float:  # noqa: ARG002
-        """See `Container.damping`; normals of neighbouring faces are nearly the same."""
+        """See `Shape.damping`; a bead may touch two faces whose normals are nearly the same."""
         return 2.0
 
     def side_clearance(self, places: FloatArray) -> FloatArray:
-        """Distance of places, shape (n, 3), from the surface, shape (n,), m; negative outside."""
+        """Distances (n,) of places (n, 3) from the surface, m; negative outside (see `Shape`)."""
         return self.vessel.clearance(places)

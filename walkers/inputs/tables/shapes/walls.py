@@ -1,7 +1,7 @@
-"""Walls: what each is asked, planes, and the inside of upright cylinders.
+"""Walls: their protocol, planes, and the inside of upright cylinders.
 
-A boundary is made of walls, and `Wall` is all that decks, measurements, pictures and the second
-engine ask of one. No other module asks which kind of wall it has. Facets, the walls of a surface of
+A boundary consists of walls. `Wall` is all that decks, measurements, pictures and the second engine
+ask of a wall; no other module depends on the kind of a wall. Facets, the walls of a surface of
 triangles, are in `walkers.inputs.meshes.facet`. A new kind is a class here; the contact model
 (`walkers/templates/engine`) and `walkers.second_engine.kernels.separation` need its gap and its
 normal.
@@ -19,12 +19,13 @@ from walkers.inputs.meshes.facet import numbers_text
 from walkers.inputs.meshes.wall_names import FLOOR_NAME
 
 FLOOR = FLOOR_NAME
+"""Name of the wall that is the floor."""
 _SIDES = 64
 """Sides of the prism that is drawn for a cylinder."""
 
 
 class KernelRow(NamedTuple):
-    """A wall as the second engine takes it.
+    """A wall in the second engine.
 
     Attributes
     ----------
@@ -82,25 +83,35 @@ class Wall(Protocol):
 
 
 def _projected(wall: Wall, places: FloatArray) -> FloatArray:
-    """The nearest points of a wall without edges."""
+    """Points of a wall without edges that are nearest to places, of the shape of the places, m."""
     points: FloatArray = places - wall.distances(places)[..., None] * wall.normals(places)
     return points
 
 
 class Flat(NamedTuple):
-    """A plane: point (m), unit normal toward the beads, name."""
+    """A plane.
+
+    Attributes
+    ----------
+    point : Vector
+        A point of the plane, m.
+    normal : Vector
+        Unit normal toward the beads.
+    name : str
+        Name of the wall, such as ``-x``.
+    """
 
     point: Vector
     normal: Vector
     name: str = FLOOR
 
     def distances(self, places: FloatArray) -> FloatArray:
-        """Of places, shape (..., 3), m."""
+        """Distances of places, shape (..., 3), from the plane, m; negative behind it."""
         distances: FloatArray = (places - self.point) @ self.normal
         return distances
 
     def normals(self, places: FloatArray) -> FloatArray:
-        """Unit vectors away from it, of the shape of the places."""
+        """The normal of the plane for each place, of the shape of the places."""
         return 0.0 * places + self.normal
 
     def nearest_points(self, places: FloatArray) -> FloatArray:
@@ -121,17 +132,25 @@ class Flat(NamedTuple):
 
     def kernel_row(self) -> KernelRow:
         """The plane in the second engine."""
-        return KernelRow(self.point, self.normal, 0.0)
+        return KernelRow(point=self.point, normal=self.normal, radius=0.0)
 
 
 class Round(NamedTuple):
-    """Inside of a vertical cylinder around the origin: radius (m), name."""
+    """Inside of an upright cylinder about the z axis.
+
+    Attributes
+    ----------
+    radius : float
+        Inner radius, m.
+    name : str
+        Name of the wall.
+    """
 
     radius: float
     name: str = "side"
 
     def distances(self, places: FloatArray) -> FloatArray:
-        """Of places, shape (..., 3), m."""
+        """Distances of places, shape (..., 3), from the cylinder, m; negative outside of it."""
         distances: FloatArray = self.radius - (places[..., 0] ** 2 + places[..., 1] ** 2) ** 0.5
         return distances
 
@@ -155,14 +174,15 @@ class Round(NamedTuple):
 
     def tangent_planes(self) -> tuple[FloatArray, FloatArray]:
         """The sides of a prism around the cylinder, arrays of shape (64, 3)."""
-        turns = 2.0 * pi * (np.arange(_SIDES) + 0.5) / _SIDES
-        outward = np.stack([np.cos(turns), np.sin(turns), 0.0 * turns], axis=1)
+        angles = 2.0 * pi * (np.arange(_SIDES) + 0.5) / _SIDES
+        outward = np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
         return self.radius * outward, -outward
 
     def kernel_row(self) -> KernelRow:
         """The cylinder in the second engine."""
-        return KernelRow((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), self.radius)
+        zero = (0.0, 0.0, 0.0)
+        return KernelRow(point=zero, normal=zero, radius=self.radius)
 
 
-BOTTOM = Flat((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
-"""The floor of all boundaries with a floor, in their own frame."""
+BOTTOM = Flat(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
+"""The floor of all boundaries that have one, in the frame of the boundary."""
