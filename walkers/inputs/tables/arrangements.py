@@ -187,12 +187,13 @@ class WalkerGeometry:
         pairs = list(touching(self.design, self.radii, _TOUCHING))
         last = len(self.radii) - 1
         if self.arrangement == "ring":
-            # The pair of the last and the first bead closes the ring and is the last one.
-            pairs = [pair for pair in pairs if pair != (0, last)]
+            # The first and the last bead close the ring: their pair comes last.
+            if (0, last) in pairs:
+                pairs.remove((0, last))
             pairs.append((0, last))
-        if self.arrangement == "fan" and last > 2:
+        if self.arrangement == "fan" and last > 2 and (1, last) in pairs:
             # A fan is not closed, even if its beads stand all around the first one.
-            pairs = [pair for pair in pairs if pair != (1, last)]
+            pairs.remove((1, last))
         return tuple(pairs)
 
     @property
@@ -246,7 +247,7 @@ class WalkerGeometry:
         middle = sum(x_of_beads) / len(x_of_beads)
         largest = max(abs(x - middle) for x in x_of_beads)
         if largest < 1e-9 * self.length:
-            return tuple(0.0 for _ in x_of_beads)
+            return (0.0,) * len(x_of_beads)
         return tuple((x - middle) / largest for x in x_of_beads)
 
     @cached_property
@@ -263,13 +264,18 @@ class WalkerGeometry:
             return self.front
         large_count = sum(large)
         small_count = len(large) - large_count
-        weights = tuple(1.0 / large_count if is_large else -1.0 / small_count for is_large in large)
+        weights = []
+        for is_large in large:
+            if is_large:
+                weights.append(1.0 / large_count)
+            else:
+                weights.append(-1.0 / small_count)
         lever = []
         for coordinates in zip(*self.design, strict=True):
             weighted = zip(weights, coordinates, strict=True)
             lever.append(sum(weight * coordinate for weight, coordinate in weighted))
         if hypot(*lever) > _SHORTEST_LEVER * self.length:
-            return weights
+            return tuple(weights)
         return self.front
 
     def places(self, heights: Sequence[float], overlaps: Sequence[float]) -> Places:

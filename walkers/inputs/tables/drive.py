@@ -13,7 +13,7 @@ from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
 from math import degrees, floor, gcd, hypot, inf, isclose, lcm, pi
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeGuard
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
@@ -78,7 +78,7 @@ the harmonics of a triangle, which end at the 9th, has 0.96 of the peak accelera
 """
 
 
-def _is_direction(value: object) -> bool:
+def _is_direction(value: object) -> TypeGuard[Sequence[float]]:
     """Whether a value has three numbers as components, and a length that is not zero or huge."""
     if not isinstance(value, (list, tuple)) or len(value) != 3:
         return False
@@ -93,8 +93,9 @@ def _read_axis(value: object) -> object:
     """An axis by its name, or a direction by its components; other values raise `ValueError`."""
     if value in ("x", "y", "z"):
         return value
-    if isinstance(value, (list, tuple)) and _is_direction(value):
-        return tuple(float(component) for component in value)
+    if _is_direction(value):
+        x, y, z = value
+        return (float(x), float(y), float(z))
     raise ValueError("expected 'x', 'y' or 'z', or a direction such as [1, 0, 1]")
 
 
@@ -321,14 +322,19 @@ class Excitation:
         """Frequency of the cycle, Hz; harmonics without a common period raise `ValueError`."""
         if self.record:
             return self.record.frequencies[0]
-        return common_frequency([harmonic.frequency for harmonic in self.harmonics])
+        return common_frequency(self._frequencies)
 
     @property
     def fastest(self) -> float:
         """The highest frequency, Hz."""
         if self.record:
             return self.record.frequencies[1]
-        return max(harmonic.frequency for harmonic in self.harmonics)
+        return max(self._frequencies)
+
+    @property
+    def _frequencies(self) -> list[float]:
+        """Frequencies of the harmonics, Hz."""
+        return [harmonic.frequency for harmonic in self.harmonics]
 
     @property
     def amplitude(self) -> float:
@@ -552,8 +558,7 @@ class Excitation:
         if len(self.harmonics) <= _DESCRIBED_HARMONICS:
             return " + ".join(_described_harmonic(harmonic) for harmonic in self.harmonics)
         largest = _described_harmonic(self.largest)
-        highest = max(harmonic.frequency for harmonic in self.harmonics)
-        return f"{largest} + {len(self.harmonics) - 1} harmonics up to {highest:g} Hz"
+        return f"{largest} + {len(self.harmonics) - 1} harmonics up to {self.fastest:g} Hz"
 
 
 def _described_harmonic(harmonic: Harmonic) -> str:
