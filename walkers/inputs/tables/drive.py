@@ -695,7 +695,7 @@ def _has_direction(vector: Sequence[float]) -> bool:
 
 
 def unit_vector(vector: Vector) -> Vector:
-    """A direction of length one; raises `ValueError` if the vector is zero."""
+    """A direction of length one; raises `ValueError` if the vector is zero or huge."""
     if not _has_direction(vector):
         raise ValueError("expected a direction such as [1, 0, 1]")
     length = hypot(*vector)
