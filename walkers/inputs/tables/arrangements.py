@@ -90,8 +90,9 @@ def _diamond(radii: Sequence[float], distance: TouchingDistance) -> Places:
     width = distance(1, 2)
     to_left = distance(1, 3)
     to_right = distance(2, 3)
-    # The last bead stands behind the line from left to right. The foot of its perpendicular and the
-    # length of this are in units of the line.
+    # The last bead stands behind the line from left to right. Along this line, the foot of its
+    # perpendicular is at a share of the width; the height is the length of the perpendicular, also
+    # as a share of the width.
     foot = (to_left**2 - to_right**2 + width**2) / (2.0 * width**2)
     if to_left < abs(foot) * width:
         raise ValueError(_TOO_SMALL)

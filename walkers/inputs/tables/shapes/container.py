@@ -76,13 +76,18 @@ class Container(Shape):
         half = self.width / 2.0 + _RIM
         return (-half, -half, -4.0 * largest), (half, half, 2.0 * self.height)
 
-    def outline(self, low: FloatArray, high: FloatArray, inside: FloatArray) -> list[FloatArray]:
+    def outline(
+        self,
+        low: FloatArray,  # noqa: ARG002
+        high: FloatArray,  # noqa: ARG002
+        inside: FloatArray,  # noqa: ARG002
+    ) -> list[FloatArray]:
         """Polygons of the walls in pictures (see `Shape.outline`), which end at the rim."""
         half = _DRAWN_WIDTH * self.width / 2.0
-        low = np.full(3, -half)
-        high = np.array([half, half, self.height])
-        inside = np.array([0.0, 0.0, self.height / 2.0])
-        return super().outline(low, high, inside)
+        lower_corner = np.full(3, -half)
+        upper_corner = np.array([half, half, self.height])
+        centre = np.array([0.0, 0.0, self.height / 2.0])
+        return super().outline(lower_corner, upper_corner, centre)
 
     def layer(self, largest: float) -> Layer:
         """A square lattice of places for beads up to a radius (m), without those close to walls."""
