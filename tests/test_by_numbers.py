@@ -96,7 +96,7 @@ def test_quarters_of_a_range() -> None:
         (False, 0.21, [0.01, 0.11, 0.21, 0.605, 1.0]),
     ):
         np.testing.assert_allclose(
-            Range(0.01, 1.0, None, scale, median).at(np.linspace(0, 1, 5)), quarters, rtol=1e-12
+            Range(0.01, 1.0, None, scale, median).quantiles(np.linspace(0, 1, 5)), quarters, rtol=1e-12
         )
 
 

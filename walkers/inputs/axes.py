@@ -27,7 +27,7 @@ class Range(NamedTuple):
     logarithmic: bool
     median: float | None = None
 
-    def at(self, shares: FloatArray) -> FloatArray:
+    def quantiles(self, shares: FloatArray) -> FloatArray:
         """Quantiles of the range."""
         ends = np.array(
             [self.low, self.high] if self.median is None else [self.low, self.median, self.high]
@@ -77,7 +77,7 @@ def values_of(key: str, axis: object) -> list[Value]:
         message = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
         raise key_error(key, message, axis)
     (first, last), unit = _numbers(key, given[:2], positive=kind == "geomspace")
-    numbers = [written(float(number), unit) for number in getattr(np, kind)(first, last, given[2])]
+    numbers = [value_in_unit(float(number), unit) for number in getattr(np, kind)(first, last, given[2])]
     # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
     whole = type(given[0]) is type(given[1]) is int
     return [int(number) if whole and number.is_integer() else number for number in numbers]
@@ -106,7 +106,7 @@ def without_unit(value: Value) -> Any:
     return quantity[0] if quantity else value
 
 
-def written(number: float, unit: str | None) -> Value:
+def value_in_unit(number: float, unit: str | None) -> Value:
     """A number as written in a case file, rounded to twelve digits so that 0.1 + 0.2 gives 0.3."""
     rounded = float(f"{number:.12g}")
     return rounded if unit is None else f"{rounded!r} {unit}"
@@ -167,9 +167,9 @@ def sampled(points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
     if not ends:
         raise key_error("sample.ranges", "expected keys and their ranges", dict(ranges))
     shares = zip(unit_cube(len(ends), points, seed).T, ends.items(), strict=True)
-    drawn = ((key, span.unit, span.at(share).tolist()) for share, (key, span) in shares)
+    drawn = ((key, span.unit, span.quantiles(share).tolist()) for share, (key, span) in shares)
     return Axis.of(
-        {key: [written(number, unit) for number in numbers] for key, unit, numbers in drawn}
+        {key: [value_in_unit(number, unit) for number in numbers] for key, unit, numbers in drawn}
     )
 
 
@@ -185,7 +185,7 @@ def descending(key: str, ends: Mapping[str, Value]) -> Axis:
             f"{first} to {last}",
         )
     number = int((start - to) / step + 1e-9) + 1
-    return Axis.of({key: [written(start - step * count, unit) for count in range(number)]})
+    return Axis.of({key: [value_in_unit(start - step * count, unit) for count in range(number)]})
 
 
 class NotARange(ValueError):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, check_limits, input_error, key_error
 from walkers.files import write_json
-from walkers.inputs.axes import Range, ranges_of, unit_cube, written
+from walkers.inputs.axes import Range, ranges_of, unit_cube, value_in_unit
 from walkers.inputs.messages import attributed_to
 from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import SweepDefinition, expand
@@ -106,7 +106,7 @@ def _range_of(value: Origin) -> dict[str, list[Any]]:
     if not ends.low * (1.0 - 1e-9) <= usual <= ends.high * (1.0 + 1e-9):
         message = f"expected a range that holds the case's own value, {value.text}"
         raise key_error(f"uncertain.{value.key}", message, [low, high])
-    return {name: [low, written(min(max(usual, ends.low), ends.high), ends.unit), high]}
+    return {name: [low, value_in_unit(min(max(usual, ends.low), ends.high), ends.unit), high]}
 
 
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> SweepDefinition:
