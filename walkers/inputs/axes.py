@@ -1,12 +1,17 @@
-"""Axes of a sweep: lists, spaced values, zipped values, and samplers."""
+"""Axes of a sweep: lists of values, spaced values, values that vary together, and samplers.
+
+An axis is written in a sweep file and expanded here into its values, as a case file has them. Cases
+are not made here: see `walkers.inputs.sweep`.
+"""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import Any, NamedTuple
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -16,10 +21,32 @@ from walkers.inputs.keys import DISTRIBUTIONS, SPACINGS, Value, flatten
 from walkers.inputs.units import as_quantity
 
 MOST_POINTS_OF_SWEEP = 1_000_000
+"""Largest number of points of an axis, and of a sweep."""
+_ROUNDING = 1e-9
+"""Rounding error of a number of steps: 4 g to 0.5 g in steps of 0.1 g are 35 steps, not 34.99…."""
 
 
-class Range(NamedTuple):
-    """Range of a random number in a unit (None: a plain number); with a ``median``, half of the draws are below it."""
+class NotARange(ValueError):
+    """A value has none of the forms of a range. The caller says which forms it accepts."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Range of a random number.
+
+    Attributes
+    ----------
+    low
+        The lower end, in ``unit``.
+    high
+        The upper end.
+    unit
+        The unit as the file has it; None for plain numbers.
+    logarithmic
+        Whether the logarithm of the number is distributed evenly, rather than the number.
+    median
+        If given, half of the draws are below it, and half above.
+    """
 
     low: float
     high: float
@@ -28,172 +55,273 @@ class Range(NamedTuple):
     median: float | None = None
 
     def quantiles(self, shares: FloatArray) -> FloatArray:
-        """Quantiles of the range."""
-        ends = np.array(
-            [self.low, self.high] if self.median is None else [self.low, self.median, self.high]
-        )
-        numbers = np.interp(
-            shares, np.linspace(0.0, 1.0, len(ends)), np.log(ends) if self.logarithmic else ends
-        )
-        return np.asarray(np.exp(numbers) if self.logarithmic else numbers)
+        """The numbers below which given shares of the draws lie, in the unit of the range."""
+        numbers = [self.low, self.high]
+        if self.median is not None:
+            numbers.insert(1, self.median)
+        nodes = np.array(numbers)
+        shares_of_nodes = np.linspace(0.0, 1.0, len(nodes))
+        if self.logarithmic:
+            return np.asarray(np.exp(np.interp(shares, shares_of_nodes, np.log(nodes))))
+        return np.asarray(np.interp(shares, shares_of_nodes, nodes))
 
 
-class Axis(NamedTuple):
-    """Keys that vary together: ``rows`` has one value per key for each point of the axis."""
+@dataclass(frozen=True)
+class Axis:
+    """Keys that vary together.
+
+    Attributes
+    ----------
+    keys
+        The dotted keys.
+    rows
+        For each point of the axis, one value for each key.
+    """
 
     keys: tuple[str, ...]
     rows: tuple[tuple[Value, ...], ...]
 
     @classmethod
-    def of(cls, columns: Mapping[str, Sequence[Value]]) -> Axis:
+    def from_columns(cls, columns: Mapping[str, Sequence[Value]]) -> Axis:
         """Make an axis from the values of each key."""
-        return cls(tuple(columns), tuple(zip(*columns.values(), strict=True)))
+        return cls(keys=tuple(columns), rows=tuple(zip(*columns.values(), strict=True)))
 
     @property
     def units(self) -> tuple[str | None, ...]:
         """The unit of each key, as `unit_of` its values."""
-        return tuple(map(unit_of, self.keys, zip(*self.rows, strict=True)))
+        columns = zip(*self.rows, strict=True)
+        return tuple(unit_of(key, values) for key, values in zip(self.keys, columns, strict=True))
 
 
 def values_of(key: str, axis: object) -> list[Value]:
-    """The values of an axis: a list, ``{ linspace = [first, last, number] }`` or ``{ geomspace = [...] }``."""
+    """The values of one key of an axis, written in one of three forms.
+
+    Parameters
+    ----------
+    key
+        The dotted key, for messages.
+    axis
+        A list of values, ``{ linspace = [first, last, number] }`` or ``{ geomspace = [...] }``.
+
+    Returns
+    -------
+    list
+        Values as a case file has them.
+
+    Raises
+    ------
+    InputError
+        If the axis has another form, no values, or values of several units.
+    """
     if isinstance(axis, list):
         if not axis:
             raise key_error(key, "expected at least one value", axis)
-        unit_of(key, axis)
+        unit_of(key, axis)  # refuses a second unit
         return axis
-    kind, given = (
-        next(iter(axis.items())) if isinstance(axis, Mapping) and len(axis) == 1 else ("", None)
+    if isinstance(axis, Mapping) and len(axis) == 1:
+        spacing, given = next(iter(axis.items()))
+        if spacing in SPACINGS:
+            return _spaced(key, axis, spacing, given)
+    message = (
+        "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
     )
-    if kind not in SPACINGS:
-        message = "expected a list of values, { linspace = [first, last, number] } or { geomspace = [...] }"
+    raise key_error(key, message, axis)
+
+
+def _spaced(key: str, axis: object, spacing: str, given: object) -> list[Value]:
+    """Values from a first to a last one; ``given`` are these two and the number of values."""
+    if not _are_ends_and_number(given):
+        example = f'{{ {spacing} = ["0.5 g", "10 g", 20] }}'
+        message = f"expected first value, last value and number, such as {example}"
         raise key_error(key, message, axis)
-    if not (
-        isinstance(given, list)
-        and len(given) == 3
-        and type(given[2]) is int
-        and 1 <= given[2] <= MOST_POINTS_OF_SWEEP
-    ):
-        message = f'expected first value, last value and number, such as {{ {kind} = ["0.5 g", "10 g", 20] }}'
-        raise key_error(key, message, axis)
-    (first, last), unit = _numbers(key, given[:2], positive=kind == "geomspace")
-    numbers = [value_in_unit(float(number), unit) for number in getattr(np, kind)(first, last, given[2])]
+    *ends, number = given
+    geometric = spacing == "geomspace"
+    (first, last), unit = _numbers(key, ends, positive=geometric)
+    spaced = np.geomspace if geometric else np.linspace
+    values = [value_in_unit(float(value), unit) for value in spaced(first, last, number)]
+    if not all(type(end) is int for end in ends):
+        return values
     # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
-    whole = type(given[0]) is type(given[1]) is int
-    return [int(number) if whole and number.is_integer() else number for number in numbers]
+    return [int(value) if value.is_integer() else value for value in values]
+
+
+def _are_ends_and_number(given: object) -> TypeGuard[list[Any]]:
+    """Whether a value is a list of a first value, a last value and a number of points."""
+    if not isinstance(given, list) or len(given) != 3:
+        return False
+    number = given[2]
+    return type(number) is int and 1 <= number <= MOST_POINTS_OF_SWEEP
 
 
 def _numbers(key: str, given: list[Value], *, positive: bool) -> tuple[list[float], str | None]:
     """The numbers of a range and their unit."""
-    unit, numbers = unit_of(key, given), [number_of(key, value) for value in given]
+    unit = unit_of(key, given)
+    numbers = [number_of(key, value) for value in given]
     if positive and min(numbers) <= 0:
         raise key_error(key, "expected values above zero", given)
     return numbers, unit
 
 
 def number_of(key: str, value: Value) -> float:
-    """The number of a value, without its unit; raises `InputError` if it is not a finite number."""
-    if (quantity := as_quantity(value)) is None:
+    """The number of a value, without its unit; `InputError` if it is not a finite number."""
+    quantity = as_quantity(value)
+    if quantity is None:
         raise key_error(key, "expected a number, or a number with its unit in quotes", value)
     return quantity[0]
 
 
 def without_unit(value: Value) -> Any:
-    """A value, or the values of a list, without unit: a number where it is a quantity, else as it is."""
+    """A value, or the values of a list, as numbers without units; words stay as they are."""
     if isinstance(value, list):
-        return [*map(without_unit, value)]
-    quantity = as_quantity(value) if isinstance(value, str) else None
-    return quantity[0] if quantity else value
+        return [without_unit(entry) for entry in value]
+    if not isinstance(value, str):
+        return value
+    quantity = as_quantity(value)
+    return value if quantity is None else quantity[0]
 
 
 def value_in_unit(number: float, unit: str | None) -> Value:
-    """A number as written in a case file, rounded to twelve digits so that 0.1 + 0.2 gives 0.3."""
+    """A number as a case file has it: with its unit, or plain if the unit is None.
+
+    It is rounded to twelve digits, so that 0.1 + 0.2 gives 0.3.
+    """
     rounded = float(f"{number:.12g}")
     return rounded if unit is None else f"{rounded!r} {unit}"
 
 
 def unit_of(key: str, values: Sequence[Value]) -> str | None:
-    """The one unit of the values of an axis; None if they are plain numbers, or no numbers at all (names, "auto")."""
-    parts = [part for value in values for part in (value if isinstance(value, list) else [value])]
-    units = {quantity[1] for quantity in map(as_quantity, parts) if quantity}
+    """The one unit of the values of a key.
+
+    Returns
+    -------
+    str or None
+        None if the values are plain numbers, or no numbers at all (names, "auto").
+
+    Raises
+    ------
+    InputError
+        If the values have several units.
+    """
+    units = set()
+    for value in values:
+        for entry in _entries(value):
+            quantity = as_quantity(entry)
+            if quantity is not None:
+                units.add(quantity[1])
     if len(units) > 1:
         raise key_error(key, "expected one unit throughout", list(values))
     return units.pop() if units else None
 
 
-def listed(key: str, given: object) -> Axis:
-    """An axis of one key with different values, so that no point occurs twice."""
+def _entries(value: Value) -> list[Value]:
+    """The entries of a list, or the value alone."""
+    return value if isinstance(value, list) else [value]
+
+
+def axis_of(key: str, given: object) -> Axis:
+    """An axis of one key; its values must differ, so that no point occurs twice."""
     values = values_of(key, given)
     occurred: set[str] = set()
     for value in values:
-        same = repr(
-            [as_quantity(part) or part for part in (value if isinstance(value, list) else [value])]
-        )
-        if same in occurred:
+        # "0.50 mm" is the same value as "0.5 mm".
+        normalised = repr([as_quantity(entry) or entry for entry in _entries(value)])
+        if normalised in occurred:
             raise key_error(key, "expected different values: this one occurs twice", value)
-        occurred.add(same)
-    return Axis.of({key: values})
+        occurred.add(normalised)
+    return Axis.from_columns({key: values})
 
 
 def crossed(table: Mapping[str, Any]) -> list[Axis]:
-    """An axis of each key."""
-    return [listed(key, given) for key, given in flatten(table).items()]
+    """An axis for each key of a table."""
+    return [axis_of(key, given) for key, given in flatten(table).items()]
 
 
 def zipped(table: Mapping[str, Any]) -> Axis:
-    """An axis of keys that vary together, first value with first value."""
-    columns = {key: values_of(key, axis) for key, axis in flatten(table).items()}
+    """An axis of keys that vary together: all first values, then all second ones, and so on."""
+    columns = {key: values_of(key, given) for key, given in flatten(table).items()}
     if not columns:
         raise key_error("zip", "expected keys and their values", dict(table))
     lengths = {key: len(values) for key, values in columns.items()}
     if len(set(lengths.values())) > 1:
-        *_, (key, values) = columns.items()
-        message = ", ".join(f"{name} has {length}" for name, length in lengths.items())
-        raise key_error(key, f"expected as many values for each key of a zip: {message}", values)
-    return Axis.of(columns)
+        last = list(columns)[-1]
+        counts = ", ".join(f"{key} has {length}" for key, length in lengths.items())
+        message = f"expected as many values for each key of a zip: {counts}"
+        raise key_error(last, message, columns[last])
+    return Axis.from_columns(columns)
 
 
 def one_at_a_time(table: Mapping[str, Any]) -> Axis:
-    """The first values of all keys, then each other value of one key with the first values of the others."""
-    columns = {axis.keys[0]: axis.rows for axis in crossed(table)}
-    usual = {key: rows[0][0] for key, rows in columns.items()}
-    changes = [{}, *({key: value} for key, rows in columns.items() for (value,) in rows[1:])]
-    return Axis(tuple(usual), tuple(tuple((usual | change).values()) for change in changes))
+    """An axis that starts at the first value of each key and changes one key at a time."""
+    columns: dict[str, list[Value]] = {}
+    for key, given in flatten(table).items():
+        columns[key] = [value for (value,) in axis_of(key, given).rows]
+    first = {key: values[0] for key, values in columns.items()}
+    rows = [tuple(first.values())]
+    for key, values in columns.items():
+        for value in values[1:]:
+            changed = {**first, key: value}
+            rows.append(tuple(changed.values()))
+    return Axis(keys=tuple(columns), rows=tuple(rows))
 
 
 def sampled(points: int, seed: int, ranges: Mapping[str, Any]) -> Axis:
-    """Points of Sobol's sequence, scrambled with the seed, in the ranges of several keys (`ranges_of`)."""
-    ends = ranges_of(ranges)
-    if not ends:
+    """An axis of points of Sobol's sequence.
+
+    Parameters
+    ----------
+    points
+        Number of points.
+    seed
+        Seed of the scrambling of the sequence.
+    ranges
+        Keys and their ranges, as `ranges_of` reads them.
+
+    Raises
+    ------
+    InputError
+        If there are no ranges, or one cannot be used.
+    """
+    spans = ranges_of(ranges)
+    if not spans:
         raise key_error("sample.ranges", "expected keys and their ranges", dict(ranges))
-    shares = zip(unit_cube(len(ends), points, seed).T, ends.items(), strict=True)
-    drawn = ((key, span.unit, span.quantiles(share).tolist()) for share, (key, span) in shares)
-    return Axis.of(
-        {key: [value_in_unit(number, unit) for number in numbers] for key, unit, numbers in drawn}
-    )
+    shares = unit_cube(len(spans), points, seed)
+    columns: dict[str, list[Value]] = {}
+    for (key, span), share in zip(spans.items(), shares.T, strict=True):
+        numbers = span.quantiles(share).tolist()
+        columns[key] = [value_in_unit(number, span.unit) for number in numbers]
+    return Axis.from_columns(columns)
 
 
-def descending(key: str, ends: Mapping[str, Value]) -> Axis:
-    """An axis of a key from a value down to another in steps; ``ends`` has the three by their keys in a sweep file."""
-    start, to, step = (number_of(name, value) for name, value in ends.items())
-    unit = unit_of(key, list(ends.values()))
-    if not (start >= to and step > 0 and start - to < MOST_POINTS_OF_SWEEP * step):
-        first, last, _ = ends.values()
-        raise key_error(
-            "descend",
-            "`from` must not be below `to`, and `step` must be positive",
-            f"{first} to {last}",
-        )
-    number = int((start - to) / step + 1e-9) + 1
-    return Axis.of({key: [value_in_unit(start - step * count, unit) for count in range(number)]})
+def descending(key: str, start: Value, to: Value, step: Value) -> Axis:
+    """An axis of a key that is lowered from a start to a last value in equal steps.
 
+    Parameters
+    ----------
+    key
+        The dotted key.
+    start, to, step
+        ``from``, ``to`` and ``step`` of ``[descend]`` in a sweep file, all in one unit.
 
-class NotARange(ValueError):
-    """A value has none of the forms of a range; who asked for the range says which forms there are."""
+    Raises
+    ------
+    InputError
+        If a value is not a number, the units differ, or the steps do not lead downwards.
+    """
+    first = number_of("descend.from", start)
+    last = number_of("descend.to", to)
+    difference = number_of("descend.step", step)
+    unit = unit_of(key, [start, to, step])
+    downwards = first >= last and difference > 0
+    if not downwards or first - last >= MOST_POINTS_OF_SWEEP * difference:
+        message = "`from` must not be below `to`, and `step` must be positive"
+        raise key_error("descend", message, f"{start} to {to}")
+    steps = int((first - last) / difference + _ROUNDING)
+    values = [value_in_unit(first - difference * count, unit) for count in range(steps + 1)]
+    return Axis.from_columns({key: values})
 
 
 def ranges_of(ranges: Mapping[str, Any]) -> dict[str, Range]:
-    """The ranges of several keys, ``{ uniform = [low, high] }`` or ``{ loguniform = [low, median, high] }``."""
+    """The ranges of several keys, each in a form that `range_of` reads, by dotted keys."""
     spans: dict[str, Range] = {}
     for key, given in flatten(ranges).items():
         try:
@@ -212,51 +340,99 @@ def range_of(key: str, given: object) -> Range:
     key
         The dotted key, for messages.
     given
-        ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``; the median may stand between the ends.
+        ``{"uniform": [low, high]}`` or ``{"loguniform": [low, high]}``. The median may stand
+        between the ends.
 
     Raises
     ------
     NotARange
         If the value has another form.
     InputError
-        If the ends are no numbers of one unit, the smaller one first.
+        If the ends are not two numbers of one unit, the smaller one first.
     """
     if not isinstance(given, Mapping) or len(given) != 1:
         raise NotARange(key)
-    distribution, ends = next(iter(given.items()))
-    if distribution not in DISTRIBUTIONS or not isinstance(ends, list) or len(ends) not in (2, 3):
+    distribution, values = next(iter(given.items()))
+    if distribution not in DISTRIBUTIONS:
+        raise NotARange(key)
+    if not isinstance(values, list) or len(values) not in (2, 3):
         raise NotARange(key)
     logarithmic = distribution == "loguniform"
-    (low, *median, high), unit = _numbers(key, ends, positive=logarithmic)
-    if low >= high or not all(low <= middle <= high for middle in median):
+    numbers, unit = _numbers(key, values, positive=logarithmic)
+    low = numbers[0]
+    high = numbers[-1]
+    median = numbers[1] if len(numbers) == 3 else None
+    if low >= high or (median is not None and not low <= median <= high):
         raise key_error(key, "expected the smaller value first", given)
-    return Range(low, high, unit, logarithmic, *median)
+    return Range(low, high, unit, logarithmic, median)
 
 
 def unit_cube(dimensions: int, points: int, seed: int) -> FloatArray:
-    """Points of Sobol's sequence in the unit cube, shape (points, dimensions), scrambled with a seed."""
+    """Points of Sobol's sequence in the unit cube.
+
+    Parameters
+    ----------
+    dimensions
+        Number of coordinates of a point.
+    points
+        Number of points, best a power of two.
+    seed
+        Seed of the scrambling of the sequence.
+
+    Returns
+    -------
+    ndarray, shape (points, dimensions)
+        Coordinates from 0 to 1.
+    """
     from scipy.stats import qmc
 
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore", UserWarning
-        )  # a number of points that is no power of two is the user's choice
-        return np.asarray(qmc.Sobol(dimensions, rng=np.random.default_rng(seed)).random(points))
+        # scipy warns of a number of points that is no power of two, but it is the user's choice.
+        warnings.simplefilter("ignore", UserWarning)
+        sampler = qmc.Sobol(dimensions, rng=np.random.default_rng(seed))
+        return np.asarray(sampler.random(points))
 
 
 def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Value, ...]]]:
-    """The keys of all axes, and one row of values for each combination of points; the last axis varies fastest."""
-    keys = tuple(key for axis in axes for key in axis.keys)
-    for number, key in enumerate(keys):
-        list_of = key.partition("[")[0]
-        if any(
-            earlier in (key, list_of) or earlier.partition("[")[0] == key
-            for earlier in keys[:number]
-        ):
-            raise key_error(key, "varies on two axes; expected one")
-    if (many := prod(len(axis.rows) for axis in axes)) > MOST_POINTS_OF_SWEEP:
-        raise key_error("axes", f"{many} points; expected at most {MOST_POINTS_OF_SWEEP}")
-    return keys, [
-        tuple(value for row in rows for value in row)
-        for rows in product(*(axis.rows for axis in axes))
-    ]
+    """All combinations of the points of several axes.
+
+    Parameters
+    ----------
+    axes
+        The axes; the last one varies fastest.
+
+    Returns
+    -------
+    keys : tuple of str
+        The keys of all axes.
+    rows : list of tuple
+        For each combination, one value for each key.
+
+    Raises
+    ------
+    InputError
+        If a key varies on two axes, or there are too many combinations.
+    """
+    keys: list[str] = []
+    for axis in axes:
+        for key in axis.keys:
+            if any(_overlap(earlier, key) for earlier in keys):
+                raise key_error(key, "varies on two axes; expected one")
+            keys.append(key)
+    number = prod(len(axis.rows) for axis in axes)
+    if number > MOST_POINTS_OF_SWEEP:
+        raise key_error("axes", f"{number} points; expected at most {MOST_POINTS_OF_SWEEP}")
+    rows = []
+    for rows_of_axes in product(*(axis.rows for axis in axes)):
+        values: list[Value] = []
+        for row_of_axis in rows_of_axes:
+            values.extend(row_of_axis)
+        rows.append(tuple(values))
+    return tuple(keys), rows
+
+
+def _overlap(first: str, second: str) -> bool:
+    """Whether two keys are the same, or one is an entry of the list that the other is."""
+    list_of_first = first.partition("[")[0]
+    list_of_second = second.partition("[")[0]
+    return first in (second, list_of_second) or second == list_of_first

@@ -73,8 +73,7 @@ class SweepFile(ConfigTable):
         axes += [one_at_a_time(self.one_at_a_time)] if self.one_at_a_time else []
         axes += [sampled(table.points, table.seed, table.ranges) for table in self.sample]
         if table := self.descend:
-            ends = {"descend.from": table.start, "descend.to": table.to, "descend.step": table.step}
-            axes.append(descending(table.key, ends))
+            axes.append(descending(table.key, table.start, table.to, table.step))
         return axes
 
 
