@@ -8,13 +8,13 @@ from typing import Any, Literal, NamedTuple
 
 from walkers.inputs.units import QuantityKind, quantity_text
 
-Whence = Literal["given", "library", "own library", "calibrated", "assumed", "default", "derived"]
+SourceKind = Literal["given", "library", "own library", "calibrated", "assumed", "default", "derived"]
 
 
 class Source(NamedTuple):
     """Where a value is from that a file does not give, as in `Origin`."""
 
-    origin: Whence
+    origin: SourceKind
     why: str = ""  # the `Origin.source`
     text: str = ""  # empty: the value is a number, in the unit of its key
     range: tuple[Any, Any] | None = None
@@ -31,7 +31,7 @@ class Origin:
 
     key: str  # dotted, such as ``contact.friction.bead_wall``
     text: str  # the value as a case file would say it, with its unit
-    origin: Whence
+    origin: SourceKind
     source: str = ""  # of the library (after its file), or the values from which it is derived
     range: tuple[Any, Any] | None = (
         None  # ends between which an unmeasured or uncertain value may lie, as in a case

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from walkers.errors import InputError, Problem, expected_of, input_error, quoted
 from walkers.inputs.messages import validated
-from walkers.inputs.origins import Whence
+from walkers.inputs.origins import SourceKind
 from walkers.inputs.toml import read_toml
 from walkers.inputs.units import (
     DENSITY,
@@ -43,14 +43,14 @@ class LibraryNumber(NamedTuple):
     calibrated_with: tuple[
         str, ...
     ] = ()  # names of the liquids of the experiments; empty: not calibrated
-    origin: Whence = "library"
+    origin: SourceKind = "library"
     logarithmic: bool = False
 
 
 class Collection(NamedTuple):
     """Tables of materials, liquids and surface pairs, and the file that they are from."""
 
-    origin: Whence
+    origin: SourceKind
     place: str
     tables: Mapping[str, Any]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from walkers.inputs.origins import Source, Whence
+from walkers.inputs.origins import Source, SourceKind
 
 
 class Notes:
@@ -13,6 +13,6 @@ class Notes:
     def __init__(self, sources: Mapping[str, Source]) -> None:
         self.sources = dict(sources)
 
-    def add(self, name: str, why: str, origin: Whence = "derived", text: str = "") -> None:
+    def add(self, name: str, why: str, origin: SourceKind = "derived", text: str = "") -> None:
         """Note why a key has its value; ``text`` is the value in words."""
         self.sources[name] = Source(origin, why, text)
