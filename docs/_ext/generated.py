@@ -22,7 +22,7 @@ from pydantic.fields import FieldInfo
 from docs.tables import markdown
 from walkers.commands import ALL_COMMANDS
 from walkers.commands.catalogue import COMMANDS, NOT_KNOWN, catalogue
-from walkers.inputs.config_table import ConfigTable, example_of, keys_in, table_in
+from walkers.inputs.config_table import ConfigTable, example_of, table_in, table_keys
 from walkers.inputs.resolving.from_library import SUPPLIED
 from walkers.inputs.resolving.library import LibraryNumber
 from walkers.inputs.tables.case import CaseFile
@@ -148,7 +148,7 @@ def tables_of_keys(
     model: type[ConfigTable] = CaseFile, place: str = ""
 ) -> Iterator[tuple[str, str]]:
     """Tables of a case file: heading, and its keys as a table of Markdown with what excludes what."""
-    fields = keys_in(model)
+    fields = table_keys(model)
     below = {name: table_in(field.annotation) for name, field in fields.items()}
     path = f"{place.strip('[]')}.".lstrip(".")
     keys = [name for name in fields if not below[name]]

@@ -153,7 +153,7 @@ class ConfigTable(BaseModel):
 
     def leaves(self, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
         """Values of all keys, tables in tables by dotted keys, each with its field; without derived fields."""
-        for name, field in keys_in(type(self)).items():
+        for name, field in table_keys(type(self)).items():
             value, place = getattr(self, name), f"{prefix}{name}"
             if isinstance(value, ConfigTable):
                 yield from value.leaves(f"{place}.")
@@ -230,23 +230,25 @@ def key_within(place: str, name: str) -> str:
 
 
 @cache
-def keys_in(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
+def table_keys(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     """The keys of a table, as a file has them, with their fields."""
     fields = model.model_fields.items()
     return {field.alias or name: field for name, field in fields if _DERIVED not in field.metadata}
 
 
 @cache
-def keys_of(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
+def dotted_keys(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     """All dotted keys of a kind of file with their fields; ``.*`` stands for names of the user's."""
     keys: dict[str, FieldInfo] = {}
-    for name, field in keys_in(model).items():
+    for name, field in table_keys(model).items():
         table, names = (
             table_in(field.annotation),
             f"{name}.*" if get_origin(field.annotation) is dict else name,
         )
         keys |= {name: field, names: field} if table else {name: field}
-        keys |= {f"{names}.{key}": below for key, below in keys_of(table).items()} if table else {}
+        keys |= (
+            {f"{names}.{key}": below for key, below in dotted_keys(table).items()} if table else {}
+        )
     return keys
 
 
@@ -275,7 +277,7 @@ def contradictions(model: type[ConfigTable], document: Any, place: str = "") -> 
         {name: value for name, value in document.items() if value != []}, place
     )
     for name, below in document.items():
-        field, where = keys_in(model).get(name), key_within(place, name)
+        field, where = table_keys(model).get(name), key_within(place, name)
         if field is None or (inner := table_in(field.annotation)) is None:
             continue
         for number, entry in enumerate(below if isinstance(below, list) else [below]):
@@ -288,7 +290,7 @@ def alternatives(model: type[ConfigTable], name: str) -> set[str]:
     """Dotted keys that a key excludes."""
     *path, last = parts_of(name)
     if path:
-        field = keys_of(model).get(".".join(part for part in path if isinstance(part, str)))
+        field = dotted_keys(model).get(".".join(part for part in path if isinstance(part, str)))
         if (table := table_in(field.annotation) if field else None) is None:
             return set()
         model = table

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from walkers.errors import InputError, Problem, key_error, quoted, suggestion
-from walkers.inputs.config_table import ConfigTable, example_of, keys_in, keys_of, table_in
+from walkers.inputs.config_table import ConfigTable, dotted_keys, example_of, table_in, table_keys
 from walkers.inputs.keys import MISSING, joined, parts_of, value_at
 from walkers.inputs.units import AUTO, WRITTEN
 
@@ -100,7 +100,7 @@ def _problem_of(
     location = tuple(part for part in details["loc"] if part != "[key]")  # of a name of the user's
     of_list = kind == "missing" and isinstance(location[-1], int)
     parts: tuple[str | int, ...] = location[:-1] if of_list else location
-    key, field = joined(parts), keys_of(file).get(_place(parts, keys_of(file)))
+    key, field = joined(parts), dotted_keys(file).get(_place(parts, dotted_keys(file)))
     example = example_of(field) if field else "a value"
     such = f", {example.removeprefix('a value ')}" if example.startswith("a value such as") else ""
     if kind == "extra_forbidden":
@@ -159,7 +159,7 @@ def _place(location: Sequence[str | int], keys: Collection[str]) -> str:
 
 def check_key(model: type[ConfigTable], key: str) -> None:
     """Refuse a key that no case has; raises `InputError` if it is one."""
-    parts, fields = re.sub(r"\[\d+\]", "", key).split("."), keys_of(model)
+    parts, fields = re.sub(r"\[\d+\]", "", key).split("."), dotted_keys(model)
     if "" in parts:
         raise key_error(key, "is not a key of a case; expected one such as drive.frequency")
     if (field := fields.get(".".join(parts))) is None:
@@ -170,10 +170,10 @@ def check_key(model: type[ConfigTable], key: str) -> None:
 
 def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
     *tables, word = location
-    fields = keys_of(file)
+    fields = dotted_keys(file)
     field = fields.get(_place(tables, fields))
     table = table_in(field.annotation) if field else None if tables else file
-    siblings = list(keys_in(table)) if table else []
+    siblings = list(table_keys(table)) if table else []
     keys = {
         re.sub(r"^(clusters|placed|drive\.harmonics)\.", r"\1[0].", key): field
         for key, field in fields.items()

@@ -11,7 +11,7 @@ from pydantic_core import to_jsonable_python
 
 from walkers.errors import input_error
 from walkers.inputs import units
-from walkers.inputs.config_table import keys_of
+from walkers.inputs.config_table import dotted_keys
 from walkers.inputs.origins import text_of
 from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.units import QuantityKind
@@ -86,7 +86,9 @@ def _is(key: str, value: Any, text: str) -> bool:
 @cache
 def quantity_kind(key: str) -> QuantityKind | None:
     """Kind of quantity of a key of a case, such as ``dimers.radii[0]``; None for pure numbers."""
-    fields = (field for name, field in keys_of(CaseFile).items() if _ending(name) == _ending(key))
+    fields = (
+        field for name, field in dotted_keys(CaseFile).items() if _ending(name) == _ending(key)
+    )
     return next(
         filter(None, (units.kind_in([*field.metadata, field.annotation]) for field in fields)), None
     )
