@@ -28,7 +28,7 @@ def build_case(
     source: str = "<case>",
     name: str = "case",
     changes: Mapping[str, Any] | None = None,
-    around: bool = False,
+    check_ranges: bool = False,
 ) -> Case:
     """Resolve a case that is given as the tables of a case file.
 
@@ -42,7 +42,7 @@ def build_case(
         Name of the case, with which the names of its run directories begin.
     changes
         Values that replace those of the document, by dotted keys, written as in a case file.
-    around
+    check_ranges
         Whether uncertain ranges must contain the values of the case. Points of a sweep may leave
         them.
 
@@ -69,7 +69,7 @@ def build_case(
             case = resolve(file, name=name, document=document, sources=sources)
         except ArithmeticError as error:
             raise input_error(source, f"inconsistent values: {error}") from error
-        _check_uncertain(case, tables, source, around=around)
+        _check_uncertain(case, tables, source, check_ranges=check_ranges)
     return case
 
 
@@ -145,7 +145,9 @@ def _validated(tables: Mapping[str, Any], unknown: list[Problem], source: str) -
         raise InputError(source, kept) from error
 
 
-def _check_uncertain(case: Case, tables: Mapping[str, Any], source: str, *, around: bool) -> None:
+def _check_uncertain(
+    case: Case, tables: Mapping[str, Any], source: str, *, check_ranges: bool
+) -> None:
     """Refuse uncertain values that are no keys, or whose ends the case could not have."""
     written = flatten(tables.get("uncertain", {}))
 
@@ -165,7 +167,11 @@ def _check_uncertain(case: Case, tables: Mapping[str, Any], source: str, *, arou
                 message = f"expected {' or '.join(instead)}, which the case has instead"
                 raise key_error(place, message, written[name])
         slack = 1e-9 * (high - low)
-        if around and isinstance(value, (int, float)) and not low - slack <= value <= high + slack:
+        if (
+            check_ranges
+            and isinstance(value, (int, float))
+            and not low - slack <= value <= high + slack
+        ):
             text = next((origin.text for origin in case.origins if origin.key == name), str(value))
             message = f"expected a range that holds the case's own value, {text}"
             raise key_error(place, message, written[name])

@@ -69,7 +69,7 @@ def load_case(
     from walkers.inputs.case_building import build_case
 
     source = "<case>" if isinstance(case, Mapping) else str(case)
-    return build_case(document, source=source, name=path.stem, changes=changes, around=True)
+    return build_case(document, source=source, name=path.stem, changes=changes, check_ranges=True)
 
 
 def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
