@@ -1,9 +1,13 @@
-"""Tables of files as frozen models: a file's keys are the fields, values are in SI units."""
+"""Tables of files as frozen models: the keys of a file are the fields, values are in SI units.
+
+This module has what all tables have in common: keys and their meanings, keys that exclude each
+other, copies with other values. The tables themselves are in `walkers.inputs.tables`.
+"""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache, cached_property
 from typing import Annotated, Any, ClassVar, Self, TypeVar, get_args, get_origin
 
@@ -12,23 +16,25 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, PydanticUndefined
 
-from walkers.errors import Problem, key_error, quoted
+from walkers.errors import InputError, Problem, key_error, quoted
 from walkers.inputs.keys import joined, parts_of
 from walkers.inputs.units import WRITTEN, is_auto, kind_in
 
 T = TypeVar("T")
 Completed = TypeVar("Completed", bound="ConfigTable")
 SAME_RUN = "same run"
-"""Annotation of a key: another value does not make another run, by itself."""
+"""Annotation of a key: another value alone does not make another run."""
 _TYPES: Mapping[Any, str] = {
     str: "text in quotes",
     int: "a whole number",
     list: "a list",
     dict: "a table",
 }
+"""What messages call the types of values."""
 
 
 def _only_derived(value: object, validation: ValidationInfo) -> object:
+    """Refuse a value of a derived field if a user has written it."""
     if validation.context == WRITTEN:
         raise PydanticCustomError("extra_forbidden", "no file has this key")
     return value
@@ -41,11 +47,36 @@ Derived = Annotated[T, _DERIVED, SkipJsonSchema()]
 """A field that follows from others, which no file has."""
 
 
-def key(meaning: str, default: Any = PydanticUndefined, example: Any = None, **bounds: Any) -> Any:
-    """A key of a table: its meaning, default (required without one), an example as a file has it, and bounds."""
-    return Field(
-        default, description=meaning, examples=None if example is None else [example], **bounds
-    )
+def key(  # noqa: PLR0913
+    meaning: str,
+    default: Any = PydanticUndefined,
+    example: Any = None,
+    *,
+    gt: float | None = None,
+    ge: float | None = None,
+    lt: float | None = None,
+    le: float | None = None,
+) -> Any:
+    """A key of a table.
+
+    Parameters
+    ----------
+    meaning
+        What the key means, for the reference and for editors.
+    default
+        Its value, in SI units, if a file leaves it out. A key without a default is required.
+    example
+        A value as a file has it.
+    gt, ge, lt, le
+        Bounds in SI units: greater than, greater or equal, less than, less or equal.
+
+    Returns
+    -------
+    Any
+        A pydantic field, to be assigned in the body of a `ConfigTable`.
+    """
+    examples = None if example is None else [example]
+    return Field(default, description=meaning, examples=examples, gt=gt, ge=ge, lt=lt, le=le)
 
 
 class Choice:
@@ -69,15 +100,24 @@ class Choice:
         self.instead = instead
 
     def excluded_by(self, name: str) -> set[str]:
-        """Keys that a key excludes."""
+        """The keys that a key excludes; none if the key is not part of the choice."""
         without = [names for names in self.expressions if name not in names]
         if len(without) == len(self.expressions):
             return set()
-        return {key for names in without for key in names}
+        return set().union(*without)
 
 
 class ConfigTable(BaseModel):
-    """A table of a file. Its fields are the keys; values are in SI units; unknown keys are refused."""
+    """A table of a file.
+
+    Its fields are the keys. Values are in SI units, and unknown keys are refused. A table is
+    frozen, hashed by its values, and equal to another of its class with equal values.
+
+    Attributes
+    ----------
+    choices
+        Keys of this class that exclude each other.
+    """
 
     model_config = ConfigDict(
         extra="forbid",
@@ -102,25 +142,35 @@ class ConfigTable(BaseModel):
         return type(self) is type(other) and self._values == other._values
 
     def with_values(self, **values: Any) -> Self:
-        """The same table with other values, which are not validated."""
+        """The same table with other values of some fields, which are not validated."""
         table = self.model_copy(update=values)
+        # The copy also has the cached properties, which follow from the former values.
         for name in table.__dict__.keys() - type(self).model_fields.keys():
-            del table.__dict__[name]  # cached properties of the former values
+            del table.__dict__[name]
         return table
 
     def with_value_at(self, name: str, value: Any) -> Self:
-        """The same tables with another value at a dotted key, which is not validated."""
+        """The same table with another value at a dotted key, which is not validated.
+
+        Parameters
+        ----------
+        name
+            The key, which may lead into tables and lists: ``drive.harmonics[1].phase``.
+        value
+            The value in SI units.
+        """
         first, *rest = parts_of(name)
+        field = str(first)
         if not rest:
-            return self.with_values(**{str(first): value})
-        below = getattr(self, str(first))
-        if isinstance(below, tuple):
-            number, *inner = rest
-            new = below[int(number)].with_value_at(joined(inner), value) if inner else value
-            return self.with_values(
-                **{str(first): (*below[: int(number)], new, *below[int(number) + 1 :])}
-            )
-        return self.with_values(**{str(first): below.with_value_at(joined(rest), value)})
+            return self.with_values(**{field: value})
+        below = getattr(self, field)
+        if not isinstance(below, tuple):
+            return self.with_values(**{field: below.with_value_at(joined(rest), value)})
+        index = int(rest[0])
+        inner = rest[1:]
+        entries = list(below)
+        entries[index] = entries[index].with_value_at(joined(inner), value) if inner else value
+        return self.with_values(**{field: tuple(entries)})
 
     def completed(self, model: type[Completed], values: Mapping[str, Any]) -> Completed:
         """The table as a model that narrows this one.
@@ -145,16 +195,29 @@ class ConfigTable(BaseModel):
         value: Any = self
         for part in parts_of(name):
             if isinstance(part, int):
-                value = value[part] if isinstance(value, tuple) and part < len(value) else None
+                has_entry = isinstance(value, tuple) and part < len(value)
+                value = value[part] if has_entry else None
             else:
                 has_key = isinstance(value, ConfigTable) and part in type(value).model_fields
                 value = getattr(value, part) if has_key else None
         return value
 
     def leaves(self, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
-        """Values of all keys, tables in tables by dotted keys, each with its field; without derived fields."""
+        """The values of all keys, also of tables in the table, without derived fields.
+
+        Parameters
+        ----------
+        prefix
+            What the dotted keys begin with.
+
+        Yields
+        ------
+        tuple
+            Dotted key, value in SI units, and field.
+        """
         for name, field in table_keys(type(self)).items():
-            value, place = getattr(self, name), f"{prefix}{name}"
+            value = getattr(self, name)
+            place = f"{prefix}{name}"
             if isinstance(value, ConfigTable):
                 yield from value.leaves(f"{place}.")
             elif isinstance(value, tuple) and value and isinstance(value[0], ConfigTable):
@@ -164,103 +227,145 @@ class ConfigTable(BaseModel):
                 yield place, value, field
 
     def determinants(self) -> dict[str, Any]:
-        """The values that make another run if they differ, by the fields that hold them; absent ones are left out.
+        """The values that make another run if they differ, by the names of their fields.
 
-        A new key therefore renames no runs; a field of another name, or another default, renames all.
+        Absent values are left out. A new key therefore renames no runs, while another name of a
+        field, or another default, renames all of them.
         """
-        kept = {}
+        determinants = {}
         for name, field in type(self).model_fields.items():
-            if SAME_RUN in field.metadata or (value := getattr(self, name)) in (None, ()):
+            value = getattr(self, name)
+            if SAME_RUN in field.metadata or value in (None, ()):
                 continue
-            several = isinstance(value, tuple) and isinstance(value[0], ConfigTable)
-            kept[name] = [entry.determinants() for entry in value] if several else value
             if isinstance(value, ConfigTable):
-                kept[name] = value.determinants()
-        return kept
+                determinants[name] = value.determinants()
+            elif isinstance(value, tuple) and isinstance(value[0], ConfigTable):
+                determinants[name] = [entry.determinants() for entry in value]
+            else:
+                determinants[name] = value
+        return determinants
 
     @classmethod
     def problems(cls, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
-        """Contradictions and gaps of a table that is given at a place."""
+        """Contradictions and gaps of a table as a file has it.
+
+        Parameters
+        ----------
+        given
+            The keys that the file gives, and their values.
+        place
+            The dotted key of the table; empty for the whole file.
+        """
         for choice in cls.choices:
             yield from cls.problems_of(choice, given, place)
 
     @classmethod
     def problems_of(cls, choice: Choice, given: Mapping[str, Any], place: str) -> Iterator[Problem]:
-        """The problem of a table that has several expressions of a choice, or a part of one, or none."""
-        begun = [
-            names
-            for names in choice.expressions
-            if any(not is_auto(given.get(name, "auto")) for name in names)
-        ]
+        """The problems of a table that has no complete expression of a choice, or several.
+
+        Parameters
+        ----------
+        choice
+            The keys of which the table has one expression.
+        given
+            The keys that the file gives, and their values. "auto" counts as not given.
+        place
+            The dotted key of the table; empty for the whole file.
+        """
+        begun = [names for names in choice.expressions if _has_any(given, names)]
         if len(begun) > 1:
-            name = next(name for name in begun[1] if name in given)
-            two = " or ".join(map(" and ".join, begun[:2]))
-            yield Problem(key_within(place, name), None, f"expected either {two}, not both")
+            first, second = begun[:2]
+            at_fault = next(name for name in second if name in given)
+            either = f"{' and '.join(first)} or {' and '.join(second)}"
+            message = f"expected either {either}, not both"
+            yield Problem(key_within(place, at_fault), None, message)
         elif begun or choice.required:
             expected = begun[0] if begun else choice.expressions[0]
-            instead = [
-                " and ".join(names)
-                for names in choice.expressions
-                if not begun and names != expected
-            ]
-            instead += [choice.instead] if choice.instead else []
-            for name in (name for name in expected if name not in given):
-                yield cls.missing(name, place, "".join(f", or {words}" for words in instead))
+            substitutes = []
+            if not begun:
+                substitutes += [" and ".join(names) for names in choice.expressions[1:]]
+            if choice.instead:
+                substitutes.append(choice.instead)
+            instead = "".join(f", or {words}" for words in substitutes)
+            for name in expected:
+                if name not in given:
+                    yield cls.missing(name, place, instead)
 
     @classmethod
     def missing(cls, name: str, place: str, instead: str = "") -> Problem:
-        """The problem of a missing key of a table at a place, with an example, and alternatives."""
-        return Problem(
-            key_within(place, name),
-            None,
-            f"missing; expected {example_of(cls.model_fields[name])}{instead}",
-        )
+        """The problem of a missing key.
+
+        Parameters
+        ----------
+        name
+            The key.
+        place
+            The dotted key of its table.
+        instead
+            End of the message, such as ``, or diameters``: what may be given in its place.
+        """
+        example = example_of(cls.model_fields[name])
+        return Problem(key_within(place, name), None, f"missing; expected {example}{instead}")
+
+
+def _has_any(given: Mapping[str, Any], names: Iterable[str]) -> bool:
+    """Whether a table has one of some keys with a value other than "auto"."""
+    return any(name in given and not is_auto(given[name]) for name in names)
 
 
 def present(value: T | None, name: str) -> T:
-    """A value of a dotted key that the choices of its table require; raises `InputError` if it is missing."""
+    """A value that the choices of its table require; `InputError` for its key if it is None."""
     if value is None:
         raise key_error(name, "missing")
     return value
 
 
 def key_within(place: str, name: str) -> str:
-    """The dotted key of a key of a table at a place."""
+    """The dotted key of a key of the table at a place; an empty place is the whole file."""
     return f"{place}.{name}".removeprefix(".")
 
 
 @cache
 def table_keys(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
-    """The keys of a table, as a file has them, with their fields."""
-    fields = model.model_fields.items()
-    return {field.alias or name: field for name, field in fields if _DERIVED not in field.metadata}
+    """The keys of a table, as a file has them, with their fields; not those of tables in it."""
+    keys = {}
+    for name, field in model.model_fields.items():
+        if _DERIVED not in field.metadata:
+            keys[field.alias or name] = field
+    return keys
 
 
 @cache
 def dotted_keys(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
-    """All dotted keys of a kind of file with their fields; ``.*`` stands for names of the user's."""
+    """All dotted keys of a kind of file with their fields; ``.*`` is a name that the user gives."""
     keys: dict[str, FieldInfo] = {}
     for name, field in table_keys(model).items():
-        table, names = (
-            table_in(field.annotation),
-            f"{name}.*" if get_origin(field.annotation) is dict else name,
-        )
-        keys |= {name: field, names: field} if table else {name: field}
-        keys |= (
-            {f"{names}.{key}": below for key, below in dotted_keys(table).items()} if table else {}
-        )
+        keys[name] = field
+        table = table_in(field.annotation)
+        if table is None:
+            continue
+        prefix = name
+        if get_origin(field.annotation) is dict:
+            prefix = f"{name}.*"
+            keys[prefix] = field
+        for name_below, field_below in dotted_keys(table).items():
+            keys[f"{prefix}.{name_below}"] = field_below
     return keys
 
 
 def table_in(annotation: Any) -> type[ConfigTable] | None:
-    """The table that a field holds, alone, in a tuple or by names."""
+    """The class of the tables that a field contains: one table, several in a list, or by names."""
     if isinstance(annotation, type) and issubclass(annotation, ConfigTable):
         return annotation
-    return next((table for inner in get_args(annotation) if (table := table_in(inner))), None)
+    for argument in get_args(annotation):
+        table = table_in(argument)
+        if table is not None:
+            return table
+    return None
 
 
 def example_of(field: FieldInfo) -> str:
-    """An example of a value of a key: ``a value such as "80 Hz"``; its type if the field has none."""
+    """An example of a value, as in ``a value such as "80 Hz"``, or its type if there is none."""
     if field.examples:
         return f"a value such as {quoted(field.examples[0])}"
     kind = kind_in([*field.metadata, field.annotation])
@@ -270,70 +375,109 @@ def example_of(field: FieldInfo) -> str:
 
 
 def contradictions(model: type[ConfigTable], document: Any, place: str = "") -> Iterator[Problem]:
-    """Contradictions and gaps of the tables of a document (`Table.problems`)."""
+    """Contradictions and gaps of all tables of a document.
+
+    Parameters
+    ----------
+    model
+        The class of the table at the place, whose `ConfigTable.problems` are asked for.
+    document
+        The table as a file has it. What is not a table has no problems here: the validation of the
+        models refuses it.
+    place
+        The dotted key of the table; empty for the whole file.
+    """
     if not isinstance(document, Mapping):
         return
-    yield from model.problems(
-        {name: value for name, value in document.items() if value != []}, place
-    )
-    for name, below in document.items():
-        field, where = table_keys(model).get(name), key_within(place, name)
-        if field is None or (inner := table_in(field.annotation)) is None:
+    given = {name: value for name, value in document.items() if value != []}
+    yield from model.problems(given, place)
+    for name, value in document.items():
+        field = table_keys(model).get(name)
+        table = table_in(field.annotation) if field else None
+        if table is None:
             continue
-        for number, entry in enumerate(below if isinstance(below, list) else [below]):
-            yield from contradictions(
-                inner, entry, f"{where}[{number}]" if isinstance(below, list) else where
-            )
+        inner_place = key_within(place, name)
+        if isinstance(value, list):
+            for number, entry in enumerate(value):
+                yield from contradictions(table, entry, f"{inner_place}[{number}]")
+        else:
+            yield from contradictions(table, value, inner_place)
 
 
 def alternatives(model: type[ConfigTable], name: str) -> set[str]:
-    """Dotted keys that a key excludes."""
+    """The dotted keys that a dotted key of a kind of file excludes."""
     *path, last = parts_of(name)
+    table: type[ConfigTable] | None = model
     if path:
-        field = dotted_keys(model).get(".".join(part for part in path if isinstance(part, str)))
-        if (table := table_in(field.annotation) if field else None) is None:
-            return set()
-        model = table
-    return {
-        joined([*path, name]) for choice in model.choices for name in choice.excluded_by(str(last))
-    }
+        names_in_path = [part for part in path if isinstance(part, str)]
+        field = dotted_keys(model).get(".".join(names_in_path))
+        table = table_in(field.annotation) if field else None
+    if table is None:
+        return set()
+    excluded = set()
+    for choice in table.choices:
+        for other_name in choice.excluded_by(str(last)):
+            excluded.add(joined([*path, other_name]))
+    return excluded
 
 
 def changed(
     model: type[ConfigTable], document: Mapping[str, Any], changes: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """A document with other values at dotted keys (``dimers.radii[0]`` for one of a list).
+    """A document with other values.
 
-    Keys that a new one excludes (`Table.choices`) go, unless they change too.
+    Parameters
+    ----------
+    model
+        The class of the whole document.
+    document
+        Tables as a file has them; they stay as they are.
+    changes
+        Values by dotted keys, ``dimers.radii[0]`` for one of a list.
+
+    Returns
+    -------
+    dict
+        The tables with the changes. Keys that a new one excludes (`alternatives`) are left out,
+        unless they change too.
+
+    Raises
+    ------
+    InputError
+        If a key leads to an entry that a list does not have.
     """
     tables = copy.deepcopy(dict(document))
     for name, value in changes.items():
-        _put(tables, name, value, alternatives(model, name) - changes.keys())
+        _set_value_at(tables, name, value, alternatives(model, name) - changes.keys())
     return tables
 
 
-def _put(tables: dict[str, Any], name: str, value: Any, instead_of: Collection[str]) -> None:
+def _set_value_at(tables: dict[str, Any], name: str, value: Any, excluded: Iterable[str]) -> None:
+    """Set the value of a dotted key in tables, and remove the keys that it excludes."""
     place: Any = tables
     parts = parts_of(name)
     for number, part in enumerate(parts):
-        above = parts[:number]
+        above = joined(parts[:number])
         if isinstance(part, int):
             if not isinstance(place, list) or part >= len(place):
-                expected = (
-                    f"a place below [{len(place)}]" if isinstance(place, list) else "the whole list"
-                )
-                message = (
-                    f"the base case has no {joined(above)} of that length; expected {expected}"
-                )
-                raise key_error(name, message, value)
+                raise _no_entry_error(name, value, above, place)
         elif isinstance(place, list):
-            raise key_error(
-                name, f"{joined(above)} is a list: say which one, such as {joined(above)}[0]", value
-            )
-        elif not isinstance(place, dict):  # the base case is wrong there, which its own check tells
-            return
-        if number + 1 < len(parts):
-            place = place[part] if isinstance(part, int) else place.setdefault(part, {})
-    for replaced in instead_of:
-        place.pop(parts_of(replaced)[-1], None)
+            message = f"{above} is a list: say which one, such as {above}[0]"
+            raise key_error(name, message, value)
+        elif not isinstance(place, dict):
+            return  # the base case is wrong there: its own validation says so
+        if number == len(parts) - 1:
+            break
+        place = place[part] if isinstance(part, int) else place.setdefault(part, {})
+    for excluded_name in excluded:
+        place.pop(parts_of(excluded_name)[-1], None)
     place[parts[-1]] = value
+
+
+def _no_entry_error(name: str, value: Any, above: str, place: object) -> InputError:
+    """The error of a key that names an entry which the list above it does not have."""
+    expected = "the whole list"
+    if isinstance(place, list):
+        expected = f"a place below [{len(place)}]"
+    message = f"the base case has no {above} of that length; expected {expected}"
+    return key_error(name, message, value)
