@@ -1,18 +1,29 @@
-"""From pydantic's errors to sentences with key, value and expectation, by the type of the error."""
+"""Messages about bad input: pydantic's errors as sentences with key, value and expectation.
+
+The sentence depends on the type of pydantic's error. What pydantic does not detect is worded where
+it is detected (`walkers.errors.key_error`); this module adds the source and the value at fault.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from walkers.errors import InputError, Problem, key_error, quoted, suggestion
-from walkers.inputs.config_table import ConfigTable, dotted_keys, example_of, table_in, table_keys
+from walkers.inputs.config_table import (
+    ConfigTable,
+    dotted_keys,
+    example_of,
+    table_in,
+    table_keys,
+)
 from walkers.inputs.keys import MISSING, joined, parts_of, value_at
 from walkers.inputs.units import AUTO, WRITTEN
 
@@ -26,7 +37,7 @@ _SENTENCES = {
     "finite_number": "expected a finite number",
     "string_type": "expected text in quotes",
     "string_too_short": "expected text in quotes",
-    "string_pattern_mismatch": "expected {meaning}{such}",
+    "string_pattern_mismatch": "expected {meaning}{such_as}",
     "float_type": "expected a plain number without a unit",
     "int_type": "expected a whole number",
     "bool_type": "expected true or false",
@@ -34,156 +45,282 @@ _SENTENCES = {
     "tuple_type": "expected a list",
     "literal_error": "expected {expected}",
     "value_error": "{error}",
-    **dict.fromkeys(
-        ("model_type", "dict_type", "model_attributes_type"), "expected a table [{key}]"
-    ),
+    "model_type": "expected a table [{key}]",
+    "dict_type": "expected a table [{key}]",
+    "model_attributes_type": "expected a table [{key}]",
 }
-"""By the type of an error of pydantic, with the values of its context."""
+"""Sentences by the type of pydantic's error, with words of its context and of `_wrong_value`."""
 _GIVEN_ELSEWHERE = {"beads": "a material", "liquid": "a liquid", "contact": "surfaces"}
 """Entries of the library that give keys of these tables."""
+_LISTS_OF_TABLES = re.compile(r"^(clusters|placed|drive\.harmonics)\.")
+"""Start of the key of a table of which a case has several; a message suggests ``clusters[0].…``."""
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a document is wrong."""
+
+    parts: tuple[str | int, ...]
+    """Names of tables and places in lists."""
+    field: FieldInfo | None
+    """The field of the key; None if the kind of file has no such key."""
+
+    @property
+    def key(self) -> str:
+        """The dotted key."""
+        return joined(self.parts)
+
+    @property
+    def table(self) -> type[ConfigTable] | None:
+        """The class of the tables at the place; None if its value is no table."""
+        return table_in(self.field.annotation) if self.field else None
+
+    @property
+    def example(self) -> str:
+        """``a value such as …``, or the type of the value."""
+        return example_of(self.field) if self.field else "a value"
+
+    @property
+    def such_as(self) -> str:
+        """The example as the end of a sentence, ``, such as …``; empty if there is none."""
+        if self.example.startswith("a value such as"):
+            return f", {self.example.removeprefix('a value ')}"
+        return ""
 
 
 def quoted_at(document: Mapping[str, Any], parts: Sequence[str | int]) -> str | None:
     """The value at a place of a document, quoted; None if there is none."""
     value = value_at(document, parts)
-    if isinstance(value, Mapping) and "rows" in value:  # a record: a case has the name of its file
+    if value is MISSING:
+        return None
+    if isinstance(value, Mapping) and "rows" in value:
+        # The contents of a record stand in the place of the name of its file, which the user wrote.
         value = value.get("file", value)
-    return None if value is MISSING else quoted(value)
+    return quoted(value)
 
 
-def _quoting(problems: Iterable[Problem], document: Mapping[str, Any]) -> list[Problem]:
-    """Problems with the values at fault as the document has them."""
-    return [
-        replace(problem, value=problem.value or quoted_at(document, parts_of(problem.key)))
-        for problem in problems
-    ]
+def _with_quotations(problems: Iterable[Problem], document: Mapping[str, Any]) -> list[Problem]:
+    """Problems with the values at fault, quoted from the document where they have none yet."""
+    complete = []
+    for problem in problems:
+        value = problem.value or quoted_at(document, parts_of(problem.key))
+        complete.append(replace(problem, value=value))
+    return complete
 
 
 @contextmanager
 def attributed_to(source: str, document: Mapping[str, Any] | None = None) -> Iterator[None]:
-    """Add to errors that name no source this one, and the value at fault as the document has it."""
+    """Give the input errors that are raised in a ``with`` block a source, if they have none.
+
+    Parameters
+    ----------
+    source
+        The file, option or argument that messages name.
+    document
+        Its tables, from which the values at fault are quoted.
+    """
     try:
         yield
     except InputError as error:
         if error.source:
             raise
-        raise InputError(source, _quoting(error.problems, document or {})) from error
+        raise InputError(source, _with_quotations(error.problems, document or {})) from error
 
 
 def validated(
     model: type[FileModel],
     document: Mapping[str, Any],
     source: str,
-    whole: str = "a case",
+    file_kind: str = "a case",
     further: Sequence[Problem] = (),
 ) -> FileModel:
-    """Nested tables as a kind of file (``whole``); raises `InputError` with all problems, the ``further`` ones too."""
-    problems = {problem.key: problem for problem in _quoting(further, document)}
+    """Nested tables as a model of a kind of file.
+
+    Parameters
+    ----------
+    model
+        The class of the whole file.
+    document
+        The tables; quantities are text with units.
+    source
+        What messages call the document.
+    file_kind
+        The kind of file in words, for messages.
+    further
+        Problems of the document that were detected before.
+
+    Returns
+    -------
+    FileModel
+        The values in SI units.
+
+    Raises
+    ------
+    InputError
+        With all problems, the further ones too; one for each key.
+    """
+    problems: dict[str, Problem] = {}
+    file = None
     try:
         file = model.model_validate(document, context=WRITTEN)
     except ValidationError as error:
-        # A default that follows from a wrong value is no problem of its own.
-        causes = (
-            details for details in error.errors() if details["type"] != "default_factory_not_called"
-        )
-        refused = [_problem_of(details, document, model, whole) for details in causes]
-        problems = {problem.key: problem for problem in refused} | problems
-    if problems:
+        for details in error.errors():
+            # A default that follows from a wrong value is no problem of its own.
+            if details["type"] != "default_factory_not_called":
+                problem = _problem_of(details, document, model, file_kind)
+                problems[problem.key] = problem
+    for problem in _with_quotations(further, document):
+        problems[problem.key] = problem
+    if problems or file is None:
         raise InputError(source, list(problems.values()))
     return file
 
 
 def _problem_of(
-    details: ErrorDetails, document: Mapping[str, Any], file: type[BaseModel], whole: str
+    details: ErrorDetails, document: Mapping[str, Any], model: type[BaseModel], file_kind: str
 ) -> Problem:
-    kind, context = details["type"], details.get("ctx", {})
-    location = tuple(part for part in details["loc"] if part != "[key]")  # of a name of the user's
-    of_list = kind == "missing" and isinstance(location[-1], int)
-    parts: tuple[str | int, ...] = location[:-1] if of_list else location
-    key, field = joined(parts), dotted_keys(file).get(_place(parts, dotted_keys(file)))
-    example = example_of(field) if field else "a value"
-    such = f", {example.removeprefix('a value ')}" if example.startswith("a value such as") else ""
-    if kind == "extra_forbidden":
-        message = _unknown_key(
-            [str(part) for part in location if isinstance(part, str)], file, whole
-        )
-    elif of_list or kind in ("too_long", "too_short"):
-        value = value_at(document, parts_of(key))
-        number = len(value) if isinstance(value, list) else 0
-        bounds = {"max_length": "at most ", "min_length": "at least "}
-        bound = next(
-            (f"{word}{context[name]}" for name, word in bounds.items() if name in context), ""
-        )
-        bound = bound or f"{int(location[-1]) + 1}"
-        message = f"has {number} value{'s' * (number != 1)}; expected {bound}{such}"
-    elif kind == "missing":
-        message = f"missing; expected {f'a table [{key}]' if field and table_in(field.annotation) else example}"
-        if len(parts) > 1 and (entry := _GIVEN_ELSEWHERE.get(str(parts[0]))):
-            message += f", or {entry} of the library"
+    """One of pydantic's errors as a problem of a file."""
+    error_type = details["type"]
+    # Pydantic marks a name that the user gives, and that is wrong itself, by a part "[key]".
+    location = tuple(part for part in details["loc"] if part != "[key]")
+    # A list that is too short lacks its next entry: the problem is one of the list.
+    lacks_entry = error_type == "missing" and isinstance(location[-1], int)
+    parts = location[:-1] if lacks_entry else location
+    fields = dotted_keys(model)
+    place = _Place(parts, fields.get(_general_key(parts, fields)))
+    if error_type == "extra_forbidden":
+        names = [part for part in parts if isinstance(part, str)]
+        message = _unknown_key(names, model, file_kind)
+    elif lacks_entry:
+        message = _wrong_length(place, document, str(int(location[-1]) + 1))
+    elif error_type == "too_long":
+        message = _wrong_length(place, document, f"at most {details['ctx']['max_length']}")
+    elif error_type == "too_short":
+        message = _wrong_length(place, document, f"at least {details['ctx']['min_length']}")
+    elif error_type == "missing":
+        message = _missing(place)
     else:
-        form = _SENTENCES.get(kind, "expected {example}")
+        message = _wrong_value(place, details)
+    return Problem(place.key, quoted_at(document, parts_of(place.key)), message)
+
+
+def _wrong_length(place: _Place, document: Mapping[str, Any], expected: str) -> str:
+    """The message about a list with too few or too many values."""
+    value = value_at(document, parts_of(place.key))
+    number = len(value) if isinstance(value, list) else 0
+    values = "1 value" if number == 1 else f"{number} values"
+    return f"has {values}; expected {expected}{place.such_as}"
+
+
+def _missing(place: _Place) -> str:
+    """The message about a required key that the file leaves out."""
+    expected = f"a table [{place.key}]" if place.table else place.example
+    message = f"missing; expected {expected}"
+    entry = _GIVEN_ELSEWHERE.get(str(place.parts[0]))
+    if entry and len(place.parts) > 1:
+        message += f", or {entry} of the library"
+    return message
+
+
+def _wrong_value(place: _Place, details: ErrorDetails) -> str:
+    """The message about a value of the wrong type or outside its bounds."""
+    error_type = details["type"]
+    context = details.get("ctx", {})
+    is_sourced = str(context.get("class_name", "")).startswith("Sourced")  # a number of the library
+    if error_type in ("list_type", "tuple_type") and place.table:
+        message = f"expected tables [[{place.key}]]"
+    elif error_type in ("list_type", "tuple_type"):
+        message = f"expected a list{place.such_as}"
+    elif error_type == "model_type" and is_sourced:
+        message = 'expected { value = ..., source = "..." }'
+    else:
         words = {
-            "example": example,
-            "such": such,
-            "meaning": field.description if field else "",
-            "key": key,
+            "example": place.example,
+            "such_as": place.such_as,
+            "meaning": place.field.description if place.field else "",
+            "key": place.key,
         }
-        message = form.format(**{**words, **context})
-        if kind == "literal_error":
-            message += suggestion(
-                str(details["input"]), re.findall(r"'([^']+)'", str(context["expected"]))
-            )
-        elif kind in ("list_type", "tuple_type") and field:
-            message = (
-                f"expected tables [[{key}]]"
-                if table_in(field.annotation)
-                else f"expected a list{such}"
-            )
-        elif kind in ("model_type", "dict_type") and str(context.get("class_name", "")).startswith(
-            "Sourced"
-        ):
-            message = 'expected { value = ..., source = "..." }'
-        if field and AUTO in field.metadata and kind != "value_error":
-            message += ', or "auto"'
-    return Problem(key, quoted_at(document, parts_of(key)), message)
+        message = _SENTENCES.get(error_type, "expected {example}").format(**(words | context))
+    if error_type == "literal_error":
+        literals = re.findall(r"'([^']+)'", str(context["expected"]))
+        message += suggestion(str(details["input"]), literals)
+    if place.field and AUTO in place.field.metadata and error_type != "value_error":
+        message += ', or "auto"'
+    return message
 
 
-def _place(location: Sequence[str | int], keys: Collection[str]) -> str:
-    """The key of a kind of file for a key of a file, with an asterisk for a name of the user's."""
-    place = ""
-    for part in (part for part in location if isinstance(part, str)):
-        below = f"{place}.{part}".lstrip(".")
-        place = below if below in keys else f"{place}.*"
-    return place
+def _general_key(location: Sequence[str | int], keys: Collection[str]) -> str:
+    """The key among those of a kind of file that stands for a key of a file.
+
+    It has no places in lists, and an asterisk for a name that the user gives.
+    """
+    general = ""
+    for part in location:
+        if isinstance(part, str):
+            below = f"{general}.{part}".lstrip(".")
+            general = below if below in keys else f"{general}.*"
+    return general
 
 
 def check_key(model: type[ConfigTable], key: str) -> None:
-    """Refuse a key that no case has; raises `InputError` if it is one."""
-    parts, fields = re.sub(r"\[\d+\]", "", key).split("."), dotted_keys(model)
+    """Refuse a dotted key that a case does not have, or that is a table; raises `InputError`."""
+    parts = re.sub(r"\[\d+\]", "", key).split(".")
     if "" in parts:
         raise key_error(key, "is not a key of a case; expected one such as drive.frequency")
-    if (field := fields.get(".".join(parts))) is None:
+    field = dotted_keys(model).get(".".join(parts))
+    if field is None:
         raise key_error(key, _unknown_key(parts, model, "a case"))
     if table_in(field.annotation):
         raise key_error(key, "is a table of a case; expected one of its keys")
 
 
-def _unknown_key(location: list[str], file: type[BaseModel], whole: str) -> str:
-    *tables, word = location
-    fields = dotted_keys(file)
-    field = fields.get(_place(tables, fields))
-    table = table_in(field.annotation) if field else None if tables else file
-    siblings = list(table_keys(table)) if table else []
-    keys = {
-        re.sub(r"^(clusters|placed|drive\.harmonics)\.", r"\1[0].", key): field
-        for key, field in fields.items()
-    }
-    hint = suggestion(word, siblings) if siblings else suggestion(".".join(location), keys)
-    plain = [
-        key for key, field in keys.items() if "*" not in key and not table_in(field.annotation)
-    ]
-    elsewhere = [key for key in plain if key.split(".")[-1] == word]
-    if not hint and elsewhere:
-        hint = f'; did you mean "{elsewhere[0]}"?'
-    within = f"[{'.'.join(tables)}]" if tables else whole
-    return f"unknown key{f'; {within} takes ' if siblings else ''}{', '.join(siblings)}{hint}"
+def _unknown_key(names: Sequence[str], model: type[BaseModel], file_kind: str) -> str:
+    """The message about a key that does not exist.
+
+    It lists the keys of its table and suggests one that the user may mean.
+
+    Parameters
+    ----------
+    names
+        The names of the tables, and last that of the key.
+    model
+        The class of the whole file.
+    file_kind
+        The kind of file in words.
+    """
+    *tables, name = names
+    keys_of_table = _keys_of_table(tables, model)
+    fields = _fields_by_suggested_key(model)
+    same_key_elsewhere = _same_key_elsewhere(name, fields)
+    if not keys_of_table:
+        return f"unknown key{suggestion('.'.join(names), fields) or same_key_elsewhere}"
+    table = f"[{'.'.join(tables)}]" if tables else file_kind
+    hint = suggestion(name, keys_of_table) or same_key_elsewhere
+    return f"unknown key; {table} takes {', '.join(keys_of_table)}{hint}"
+
+
+def _keys_of_table(tables: Sequence[str], model: type[BaseModel]) -> list[str]:
+    """The keys of the innermost of nested tables; none if there is no such table."""
+    if not tables:
+        return list(table_keys(model))
+    fields = dotted_keys(model)
+    field = fields.get(_general_key(tables, fields))
+    table = table_in(field.annotation) if field else None
+    return list(table_keys(table)) if table else []
+
+
+def _fields_by_suggested_key(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """The fields of a kind of file by their keys as a message suggests them."""
+    fields = {}
+    for key, field in dotted_keys(model).items():
+        fields[_LISTS_OF_TABLES.sub(r"\1[0].", key)] = field
+    return fields
+
+
+def _same_key_elsewhere(name: str, fields: Mapping[str, FieldInfo]) -> str:
+    """A suggestion of the first key of this name in another table; empty if there is none."""
+    for key, field in fields.items():
+        is_plain = "*" not in key and not table_in(field.annotation)
+        if is_plain and key.split(".")[-1] == name:
+            return f'; did you mean "{key}"?'
+    return ""
