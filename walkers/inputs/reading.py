@@ -1,4 +1,7 @@
-"""Case files: found, read as TOML, validated and resolved."""
+"""Files that users name: found and, if they are cases, read and resolved.
+
+How a case follows from its tables is in `walkers.inputs.case_building`.
+"""
 
 from __future__ import annotations
 
@@ -23,13 +26,16 @@ _COMMANDS = {
     "calibration": "a calibration: walkers calibrate {}",
     "library": "a library: cases beside it can name what is in it; walkers library prints it",
     "case.json": "a run's directory: walkers run {}, or plot, render, export",
-    "sweep.json": "a sweep's directory: walkers list {}, or plot, report; its file goes to walkers sweep",
+    "sweep.json": "a sweep's directory: walkers list {}, or plot, report; "
+    "its file goes to walkers sweep",
 }
-"""The commands for each kind of input."""
+"""What each kind of input is, and the commands for it; directories are told by a file in them."""
+_NO_NAMES = (".", "..")
+"""Stems of files that have no name before their ``.toml``."""
 
 
 def shipped(kind: str) -> dict[str, Path]:
-    """The files of a kind (case, sweep, calibration) that come with the project, by name."""
+    """The files of a kind (case, sweep, calibration) that come with the program, by their names."""
     return {path.stem: path for path in sorted((_HERE / f"{kind}s").glob("*.toml"))}
 
 
@@ -60,87 +66,153 @@ def load_case(
     >>> case = load_case("fig1b")
     >>> case.dimers.radii, case.drive.frequency
     ((0.0003, 0.0002), 80.0)
-    >>> load_case("fig1b", {"drive.frequency": "70 Hz", "dimers.radii[1]": "0.25 mm"}).walkers[0].radii
+    >>> load_case("fig1b", {"dimers.radii[1]": "0.25 mm"}).walkers[0].radii
     (0.0003, 0.00025)
     """
-    path = Path("case.toml") if isinstance(case, Mapping) else find_input(case, "case")
-    document = case if isinstance(case, Mapping) else read_case(path)
+    if isinstance(case, Mapping):
+        document: Mapping[str, Any] = case
+        source = "<case>"
+        name = "case"
+    else:
+        path = find_input(case, "case")
+        document = read_case(path)
+        source = str(case)
+        name = path.stem
     # Not above: a missing file is reported before the models of a case are built, which takes time.
     from walkers.inputs.case_building import build_case
 
-    source = "<case>" if isinstance(case, Mapping) else str(case)
-    return build_case(document, source=source, name=path.stem, changes=changes, check_ranges=True)
+    return build_case(document, source=source, name=name, changes=changes, check_ranges=True)
 
 
 def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
-    """The tables of a case file, with the mesh and the record that it names, and the user's own library.
+    """The tables of a case file, with the contents of the files beside it.
 
-    That is the library beside the file; beside a case that comes with the program it is that in ``folder``, the working
-    directory if None. A case that has a ``[library]`` itself takes no other.
+    These are the mesh and the record that it names, and the user's own library. A case that has a
+    ``[library]`` itself takes no other.
+
+    Parameters
+    ----------
+    path
+        The case file.
+    folder
+        Where the library is for a case that comes with the program; the working directory if None.
+        For another case, it is beside the file.
+
+    Returns
+    -------
+    dict
+        The tables, with ``meshes``, ``records`` and ``library`` if there are any.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, or the case has a table that only the program adds.
     """
     document = read_toml(path)
     with attributed_to(str(path), document):
-        mesh = value_at(document, ("boundary", "mesh"))
-        of_archive = value_at(document, ("meshes", mesh)) is not MISSING  # whose case has its mesh
-        for table in {"records", "meshes"} - ({"meshes"} if of_archive else set()):
-            if table in document:
-                raise key_error(
-                    table,
-                    "unknown key: the program reads this table from a file that the case names",
-                )
+        _check_added_tables(document)
         document = with_files(document, path.parent)
     if "library" not in document and path.name != FILE_NAME:
-        beside = (folder or Path()) if path.parent == _HERE / "cases" else path.parent
-        if library := read_library(beside):
+        is_shipped = path.parent == _HERE / "cases"
+        library = read_library((folder or Path()) if is_shipped else path.parent)
+        if library:
             document["library"] = library
     return document
 
 
+def _check_added_tables(document: Mapping[str, Any]) -> None:
+    """Refuse tables that the program makes of the files that a case names."""
+    mesh = value_at(document, ("boundary", "mesh"))
+    # The case of an archive contains its mesh.
+    contains_mesh = value_at(document, ("meshes", mesh)) is not MISSING
+    added = ("records",) if contains_mesh else ("records", "meshes")
+    for table in added:
+        if table in document:
+            message = "unknown key: the program reads this table from a file that the case names"
+            raise key_error(table, message)
+
+
 def is_sweep_file(path: Path) -> bool:
-    """Whether a file is a sweep's."""
+    """Whether there is a sweep file at a path."""
     return path.is_file() and _kind_of(path) == "sweep"
 
 
 def find_input(name: str | Path, kind: str) -> Path:
-    """A file of a kind (case, sweep, calibration) by its path, with or without ``.toml``, or by its shipped name."""
+    """Find a file that a user names.
+
+    Parameters
+    ----------
+    name
+        Its path, with or without ``.toml``, or the name of a shipped file.
+    kind
+        ``case``, ``sweep`` or ``calibration``.
+
+    Returns
+    -------
+    Path
+        The file. It may be of a kind that cannot be told: reading it says what is wrong.
+
+    Raises
+    ------
+    InputError
+        If there is no such file, or it is of another kind. The message suggests names or commands.
+    """
     check_utf8(name)
-    text, path, of_kind = str(name), Path(name), shipped(kind)
+    text = str(name)
+    path = Path(name)
+    shipped_files = shipped(kind)
     try:
-        if text in of_kind and not path.is_file():
-            return of_kind[text]
+        if text in shipped_files and not path.is_file():
+            return shipped_files[text]
         if not path.exists() and Path(f"{name}.toml").is_file():
             path = Path(f"{name}.toml")
-        if (actual := _kind_of(path)) not in (None, kind):
-            raise input_error(name, f"is {_COMMANDS[str(actual)].format(name)}")
+        actual_kind = _kind_of(path)
+        if actual_kind not in (None, kind):
+            raise input_error(name, f"is {_COMMANDS[str(actual_kind)].format(name)}")
         if path.exists():
-            if path.stem in (".", ".."):  # of "...toml"
+            if path.stem in _NO_NAMES:
                 raise input_error(name, "expected a name before .toml")
             return path
     except OSError as error:
         raise input_error(shortened(text), f"cannot be read: {error.strerror}") from error
     missing = "no such file, run or sweep" if kind == "case" else "no such file"
-    raise input_error(
-        name, f"{missing}, nor a shipped {kind} ({', '.join(of_kind)}){suggestion(text, of_kind)}"
-    )
+    names = ", ".join(shipped_files)
+    hint = suggestion(text, shipped_files)
+    raise input_error(name, f"{missing}, nor a shipped {kind} ({names}){hint}")
 
 
 def _kind_of(path: Path) -> str | None:
-    """Kind of the file at a path or of a shipped name; None if unknown."""
+    """Kind of input at a path or of a shipped name (a key of `_COMMANDS`); None if unknown."""
     with suppress(OSError, InputError):
         if path.is_dir():
-            return next(
-                (file for file in ("sweep.json", "case.json") if (path / file).is_file()), None
-            )
+            return _kind_of_directory(path)
         if path.is_file():
-            document = (
-                read_toml(path) if path.stem not in (".", "..") else {}
-            )  # refused for its name
-            if document.keys() & {"beads", "boundary", "drive", "liquid"}:
-                return "case"
-            if document.keys() & {"materials", "liquids", "surface_pairs"}:
-                return "library"
-            of_calibrations = document.keys() & {"parameters", "experiments", "observations"}
-            return ("calibration" if of_calibrations else "sweep") if "case" in document else None
-    return next(
-        (kind for kind in ("case", "sweep", "calibration") if str(path) in shipped(kind)), None
-    )
+            return _kind_of_file(path)
+    for kind in ("case", "sweep", "calibration"):
+        if str(path) in shipped(kind):
+            return kind
+    return None
+
+
+def _kind_of_directory(path: Path) -> str | None:
+    """The file that makes a directory one of a sweep or of a run; None for another directory."""
+    for file in ("sweep.json", "case.json"):
+        if (path / file).is_file():
+            return file
+    return None
+
+
+def _kind_of_file(path: Path) -> str | None:
+    """Kind of a TOML file by its tables; None if they do not tell."""
+    if path.stem in _NO_NAMES:
+        return None
+    tables = read_toml(path).keys()
+    if tables & {"beads", "boundary", "drive", "liquid"}:
+        return "case"
+    if tables & {"materials", "liquids", "surface_pairs"}:
+        return "library"
+    if "case" not in tables:
+        return None
+    if tables & {"parameters", "experiments", "observations"}:
+        return "calibration"
+    return "sweep"
