@@ -14,66 +14,103 @@ from walkers.errors import InputError, Problem, key_error
 Value = Any
 """A TOML value: text with a unit, a number, or a list of such."""
 MISSING = object()
+"""What `value_at` returns where there is no value, which may itself be None."""
 SPACINGS = ("linspace", "geomspace")
+"""Names of the spacings of an axis, those of numpy."""
 DISTRIBUTIONS = ("uniform", "loguniform")
+"""Names of the distributions of a range."""
 
 
 @lru_cache(maxsize=4096)
 def parts_of(key: str) -> tuple[str | int, ...]:
-    """Names of tables and places in lists."""
-    return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[^.\[\]]+", key))
+    """Names of tables and places in lists.
+
+    Examples
+    --------
+    >>> parts_of("drive.harmonics[1]")
+    ('drive', 'harmonics', 1)
+    """
+    words = re.findall(r"[^.\[\]]+", key)
+    return tuple(int(word) if word.isdigit() else word for word in words)
 
 
 def joined(parts: Sequence[str | int]) -> str:
-    """A dotted key of its parts."""
-    return "".join(
-        f"[{part}]" if isinstance(part, int) else f".{part}" for part in parts
-    ).removeprefix(".")
+    """The dotted key of names of tables and places in lists; the inverse of `parts_of`."""
+    key = ""
+    for part in parts:
+        key += f"[{part}]" if isinstance(part, int) else f".{part}"
+    return key.removeprefix(".")
 
 
 def value_at(document: Any, parts: Sequence[str | int]) -> Any:
-    """What nested tables and lists have at a place; `MISSING` if there is none."""
+    """The value of nested tables and lists at a place; `MISSING` if there is no such place."""
+    value = document
     for part in parts:
         try:
-            document = document[part]
+            value = value[part]
         except (KeyError, IndexError, TypeError):
             return MISSING
-    return document
+    return value
 
 
 def is_axis(value: object) -> bool:
-    """Whether a table is an axis rather than a table of axes."""
-    return isinstance(value, Mapping) and any(name in value for name in (*SPACINGS, *DISTRIBUTIONS))
+    """Whether a value is an axis or a range, such as ``{"linspace": …}``, no table of them."""
+    if not isinstance(value, Mapping):
+        return False
+    return not value.keys().isdisjoint((*SPACINGS, *DISTRIBUTIONS))
 
 
 def flatten(table: Mapping[str, Any]) -> dict[str, Any]:
-    """Dotted keys of nested tables and axes; ``{"drive": {"frequency": …}}`` is ``{"drive.frequency": …}``."""
+    """The values of nested tables by dotted keys; axes and empty tables are values.
+
+    Raises
+    ------
+    InputError
+        If a key is given twice, once dotted and once in a table.
+
+    Examples
+    --------
+    >>> flatten({"drive": {"frequency": "80 Hz"}})
+    {'drive.frequency': '80 Hz'}
+    """
     flat: dict[str, Any] = {}
     for name, value in table.items():
         below = {name: value}
         if isinstance(value, Mapping) and value and not is_axis(value):
-            below = {f"{name}.{key}": leaf for key, leaf in flatten(value).items()}
-        if twice := flat.keys() & below.keys():
-            raise key_error(twice.pop(), "is given twice; expected one value")
+            below = {f"{name}.{key}": inner for key, inner in flatten(value).items()}
+        repeated = flat.keys() & below.keys()
+        if repeated:
+            raise key_error(repeated.pop(), "is given twice; expected one value")
         flat |= below
     return flat
 
 
 def settings_of(words: Iterable[str]) -> dict[str, Value]:
-    """Values from ``key=value``, the value as a case file has it; quotes about text may be left out.
+    """Values by dotted keys from words of a command line.
+
+    Parameters
+    ----------
+    words
+        Each ``key=value`` with the value as a case file has it; text needs no quotes.
+
+    Raises
+    ------
+    InputError
+        If a word is not of this form, or a key is given twice.
 
     Examples
     --------
-    >>> settings_of(["drive.frequency=70 Hz", "contact.restitution=0.4", "dimers.radii=[0.3 mm, 0.2 mm]"])
-    {'drive.frequency': '70 Hz', 'contact.restitution': 0.4, 'dimers.radii': ['0.3 mm', '0.2 mm']}
+    >>> settings_of(["drive.frequency=70 Hz", "dimers.radii=[0.3 mm, 0.2 mm]"])
+    {'drive.frequency': '70 Hz', 'dimers.radii': ['0.3 mm', '0.2 mm']}
+    >>> settings_of(["contact.restitution=0.4"])
+    {'contact.restitution': 0.4}
     """
     settings: dict[str, Value] = {}
     for word in words:
         key, separator, text = (part.strip() for part in word.partition("="))
         if not (key and separator and text):
-            raise InputError(
-                "--set", [Problem(word, None, "expected key=value, such as drive.frequency=70Hz")]
-            )
+            problem = Problem(word, None, "expected key=value, such as drive.frequency=70Hz")
+            raise InputError("--set", [problem])
         if key in settings:
             raise InputError("--set", [Problem(key, text, "is given twice; expected one value")])
         settings[key] = _value(text)
@@ -81,9 +118,12 @@ def settings_of(words: Iterable[str]) -> dict[str, Value]:
 
 
 def _value(text: str) -> Value:
-    with suppress(ValueError):  # no TOML, or further keys on further lines
-        (value,) = tomllib.loads(f"value = {text}").values()
-        return value
+    """A value from a command line: as TOML if it is, else a list without quotes, else text."""
+    tables: dict[str, Any] = {}
+    with suppress(ValueError):
+        tables = tomllib.loads(f"value = {text}")
+    if len(tables) == 1:  # further lines of the text might be further keys
+        return tables["value"]
     if text.startswith("[") and text.endswith("]") and "[" not in text[1:]:
         return [_value(part.strip()) for part in text[1:-1].split(",")]
     return text
