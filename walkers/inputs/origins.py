@@ -1,4 +1,4 @@
-"""Origin of each value of a case: the case, the library, a calibration, a default, or other values."""
+"""Where the values of a case are from: the case, the library, calibrations, or other values."""
 
 from __future__ import annotations
 
@@ -8,39 +8,74 @@ from typing import Any, Literal, NamedTuple
 
 from walkers.inputs.units import QuantityKind, quantity_text
 
-SourceKind = Literal["given", "library", "own library", "calibrated", "assumed", "default", "derived"]
+SourceKind = Literal[
+    "given", "library", "own library", "calibrated", "assumed", "default", "derived"
+]
+"""Where a value is from.
+
+It is ``given`` by the case (or beside it), from the ``library`` of the program or the user's
+``own library``, ``calibrated``, ``assumed`` (fixed in the calibration), the ``default``, or
+``derived`` from other values.
+"""
 
 
 class Source(NamedTuple):
-    """Where a value is from that a file does not give, as in `Origin`."""
+    """Where a value is from that a file does not give; `Origin` is made of it.
+
+    Attributes
+    ----------
+    origin
+        The kind of its source.
+    why
+        What becomes `Origin.source`.
+    text
+        The value in words; empty for a number, which is written in the unit of its key.
+    range
+        Ends between which an unmeasured value may lie, SI units.
+    logarithmic
+        Whether the logarithm of the value is distributed evenly over the range.
+    """
 
     origin: SourceKind
-    why: str = ""  # the `Origin.source`
-    text: str = ""  # empty: the value is a number, in the unit of its key
+    why: str = ""
+    text: str = ""
     range: tuple[Any, Any] | None = None
     logarithmic: bool = False
 
 
 @dataclass(frozen=True)
 class Origin:
-    """Origin of a value of a case.
+    """A value of a case, and where it is from.
 
-    It is ``given`` by the case (or beside it), from the ``library`` of the program or the user's ``own library``,
-    ``calibrated``, ``assumed`` (fixed in the calibration), the ``default``, or ``derived`` from other values.
+    Attributes
+    ----------
+    key
+        The dotted key, such as ``contact.friction.bead_wall``.
+    text
+        The value as a case file has it, with its unit.
+    origin
+        The kind of its source.
+    source
+        The source that the library gives (after the library's file), or the values from which the
+        value is derived.
+    range
+        Ends between which an unmeasured or uncertain value may lie, as in a case.
+    logarithmic
+        Whether the logarithm of the value is distributed evenly over the range.
+    uncertain
+        Whether the case lists the value under ``[uncertain]``.
+    value
+        The value in SI units; text if the case says it in words, such as ``auto``.
     """
 
-    key: str  # dotted, such as ``contact.friction.bead_wall``
-    text: str  # the value as a case file would say it, with its unit
+    key: str
+    text: str
     origin: SourceKind
-    source: str = ""  # of the library (after its file), or the values from which it is derived
-    range: tuple[Any, Any] | None = (
-        None  # ends between which an unmeasured or uncertain value may lie, as in a case
-    )
-    logarithmic: bool = False  # whether the range is of magnitudes
-    uncertain: bool = False  # whether the case calls it so
-    value: Any = field(
-        default=None, compare=False
-    )  # SI; as text if the case says it in words, such as ``auto``
+    source: str = ""
+    range: tuple[Any, Any] | None = None
+    logarithmic: bool = False
+    uncertain: bool = False
+    value: Any = field(default=None, compare=False)
 
     @property
     def guessed(self) -> bool:
@@ -49,21 +84,37 @@ class Origin:
 
     @property
     def word(self) -> str:
-        """``guessed`` for a default that has a range; else the origin, and ``uncertain`` if the case calls it so."""
+        """The origin in words: ``guessed`` for a default that has a range.
+
+        Otherwise, ``uncertain`` is added if the case lists the value as such.
+        """
         if self.origin == "default" and self.range is not None:
             return "guessed"
         return f"{self.origin}, uncertain" if self.uncertain else self.origin
 
 
 def text_of(value: Any, kind: QuantityKind | None = None) -> str:
-    """A value of a case file as text: lists with commas, tables by their keys; numbers of a kind are in SI units."""
+    """A value of a case as text, as a case file has it.
+
+    Parameters
+    ----------
+    value
+        A number, a word, a list (written with commas) or a table (written by its keys).
+    kind
+        The kind of quantity if numbers are in SI units; None for pure numbers.
+    """
     if isinstance(value, (list, tuple)):
-        texts = ((text_of(entry, kind), isinstance(entry, (list, tuple))) for entry in value)
-        return ", ".join(f"({text})" if nested else text for text, nested in texts)
+        texts = []
+        for entry in value:
+            text = text_of(entry, kind)
+            texts.append(f"({text})" if isinstance(entry, (list, tuple)) else text)
+        return ", ".join(texts)
     if isinstance(value, bool):
         return "true" if value else "false"
     if kind is not None and isinstance(value, (int, float)):
         return quantity_text(value, kind)
     if isinstance(value, Mapping):
-        return "; ".join(f"{name} {text_of(below)}" for name, below in value.items())
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+        return "; ".join(f"{name} {text_of(inner)}" for name, inner in value.items())
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return str(value)
