@@ -11,23 +11,28 @@ from pydantic_core.core_schema import NullableSchema, TupleSchema, WithDefaultSc
 
 from walkers.inputs.tables.case import CaseFile
 
-_LINK = re.compile(r" See \[\]\(\S+\)\.")  # to a page, from the page of keys
+_LINK = re.compile(r" See \[\]\(\S+\)\.")
+"""Links in the meanings of keys, which the page of keys has to other pages."""
 
 
 class _Generator(GenerateJsonSchema):
-    """Without null, which TOML lacks, without defaults, which are in SI units, and without titles."""
+    """A schema without null, which TOML lacks, defaults, which are in SI units, and titles."""
 
     def normalize_name(self, name: str) -> str:
-        """Definitions are named after tables: ``Liquid``, not ``LiquidTable``."""
+        """The name of a definition is that of a table: ``Liquid``, not ``LiquidTable``."""
         return super().normalize_name(name).removesuffix("Table")
 
     def field_title_should_be_set(self, schema: Any) -> bool:  # noqa: ARG002
         return False
 
     def tuple_schema(self, schema: TupleSchema) -> JsonSchemaValue:
-        """Lists of a fixed length whose entries are alike: older drafts, which editors read, know ``items`` alone."""
+        """A list of fixed length, whose entries are all of one kind.
+
+        Editors read older drafts of JSON Schema, which know ``items`` but not ``prefixItems``.
+        """
         schema_of_tuple = super().tuple_schema(schema)
-        if entries := schema_of_tuple.pop("prefixItems", None):
+        entries = schema_of_tuple.pop("prefixItems", None)
+        if entries:
             schema_of_tuple["items"] = entries[0]
         return schema_of_tuple
 
@@ -39,14 +44,17 @@ class _Generator(GenerateJsonSchema):
 
 
 def case_schema() -> dict[str, Any]:
-    """The schema of a case file (JSON Schema 2020-12), without exclusions of keys and values of the library."""
-    schema = CaseFile.model_json_schema(schema_generator=_Generator)
-    schema = json.loads(_LINK.sub("", json.dumps(schema)))
+    """The schema of a case file, JSON Schema 2020-12.
+
+    It does not say which keys exclude each other. Keys that the library may give are not required.
+    """
+    with_links = CaseFile.model_json_schema(schema_generator=_Generator)
+    schema = json.loads(_LINK.sub("", json.dumps(with_links)))
     schema["properties"]["library"] = {
         "type": "object",
         "description": "Materials and liquids of the case itself.",
     }
-    for table in ("Beads", "Liquid", "Contact", "Friction"):  # the library may give what they lack
+    for table in ("Beads", "Liquid", "Contact", "Friction"):  # the library may give their keys
         schema["$defs"][table].pop("required", None)
     return {
         **schema,
