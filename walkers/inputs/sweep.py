@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -34,6 +34,9 @@ from walkers.inputs.toml import read_toml, with_files
 from walkers.inputs.units import Speed, Whole
 
 _LONGEST_NAME = 120
+"""Largest length of the name of a sweep, in bytes."""
+_DIGITS_OF_DIGEST = 12
+"""Length of the hexadecimal digest at the end of a shortened name."""
 
 
 class SampleTable(ConfigTable):
@@ -69,46 +72,70 @@ class SweepFile(ConfigTable):
 
     def all_axes(self) -> list[Axis]:
         """All axes in their order; the last one varies fastest. A descent is last."""
-        axes = [*crossed(self.axes), *(zipped(table) for table in self.zip)]
-        axes += [one_at_a_time(self.one_at_a_time)] if self.one_at_a_time else []
+        axes = crossed(self.axes)
+        axes += [zipped(table) for table in self.zip]
+        if self.one_at_a_time:
+            axes.append(one_at_a_time(self.one_at_a_time))
         axes += [sampled(table.points, table.seed, table.ranges) for table in self.sample]
-        if table := self.descend:
-            axes.append(descending(table.key, table.start, table.to, table.step))
+        descent = self.descend
+        if descent:
+            axes.append(descending(descent.key, descent.start, descent.to, descent.step))
         return axes
 
 
 @dataclass(frozen=True, repr=False)
 class SweepDefinition:
-    """A base case and its variations."""
+    """A base case and its variations.
 
-    name: str  # of its file, and of its directory
-    source: str  # what messages call it
-    case_name: str  # with which the runs' directories begin
-    base: Mapping[str, Any]  # tables of the file of the base case
-    file: Mapping[str, Any]  # tables of the sweep file
-    document: Mapping[str, Any]  # tables of the base case, changed by ``[set]``
-    axes: Sequence[Axis]  # keys that vary, and their values
-    rows: Sequence[tuple[Value, ...]]  # the points: one value a key
-    until_below: (
-        float | None
-    )  # speed (m/s) below which walkers are at rest on the last axis, if that is a descent
+    Attributes
+    ----------
+    name
+        Name of the sweep file and of the directory of the sweep.
+    source
+        What messages call the sweep.
+    case_name
+        What the names of the directories of the runs begin with.
+    base
+        Tables of the file of the base case.
+    file
+        Tables of the sweep file.
+    document
+        Tables of the base case, changed by ``[set]``.
+    axes
+        The keys that vary, and their values.
+    rows
+        The points: one value for each key.
+    until_below
+        If the last axis is a descent: speed, m/s, below which walkers are at rest; else None.
+    """
+
+    name: str
+    source: str
+    case_name: str
+    base: Mapping[str, Any]
+    file: Mapping[str, Any]
+    document: Mapping[str, Any]
+    axes: Sequence[Axis]
+    rows: Sequence[tuple[Value, ...]]
+    until_below: float | None
 
     @property
     def title(self) -> str:
-        """The title that the file gives, if it does."""
+        """The title that the file gives; empty without one."""
         return str(self.file.get("title", ""))
 
     @cached_property
     def values(self) -> list[tuple[Any, ...]]:
-        """The points without units."""
+        """The points as numbers without units; words stay as they are."""
         return [tuple(map(without_unit, row)) for row in self.rows]
 
     @cached_property
     def units(self) -> dict[str, str | None]:
-        """The varied keys with their units; None if one has no unit."""
-        return {
-            key: unit for axis in self.axes for key, unit in zip(axis.keys, axis.units, strict=True)
-        }
+        """The units of the varied keys; None for a key without one."""
+        units: dict[str, str | None] = {}
+        for axis in self.axes:
+            units.update(zip(axis.keys, axis.units, strict=True))
+        return units
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -116,56 +143,90 @@ class SweepDefinition:
         return tuple(self.units)
 
     def cases(self) -> Iterator[Case]:
-        """The case of each point, resolved; raises `InputError` if a point cannot be used; it says which."""
+        """The resolved case of each point, one after the other.
+
+        Raises
+        ------
+        InputError
+            If a point cannot be used. The message says which one.
+        """
         for number, row in enumerate(self.rows):
             changes = dict(zip(self.keys, row, strict=True))
-            text = ", ".join(f"{key} = {value}" for key, value in changes.items())
-            where = f"{self.source}: point {number} ({text})" if text else self.source
-            with attributed_to(where):
+            point = ", ".join(f"{key} = {value}" for key, value in changes.items())
+            source = f"{self.source}: point {number} ({point})" if point else self.source
+            with attributed_to(source):
                 document = changed(CaseFile, self.document, changes)
-            case = build_case(document, source=where, name=self.case_name)
-            # The title of the base case may not hold here.
-            yield (
-                case.with_values(title=f"{shortened(self.name)}: {shortened(text)}")
-                if text
-                else case
-            )
+            case = build_case(document, source=source, name=self.case_name)
+            if point:
+                # The title of the base case need not hold for a point.
+                case = case.with_values(title=f"{shortened(self.name)}: {shortened(point)}")
+            yield case
 
 
 def load_sweep(
     sweep: str | Path | Mapping[str, Any], changes: Mapping[str, Value] | None = None
 ) -> SweepDefinition:
-    """Read a sweep file, a shipped sweep such as ``fig2``, or the tables of a sweep file, and expand it.
+    """Read a sweep and expand it into its points.
 
-    ``changes`` are put beside its ``[set]``; its name tells of them. Its points are checked by `Sweep.cases`.
+    Parameters
+    ----------
+    sweep
+        A sweep file, the name of a shipped sweep such as ``fig2``, or the tables of a sweep file.
+    changes
+        Values by dotted keys, which are added to the ``[set]`` of the file. The name of the sweep
+        contains them.
+
+    Returns
+    -------
+    SweepDefinition
+        Its points are not resolved yet: `SweepDefinition.cases` validates them.
+
+    Raises
+    ------
+    InputError
+        If the file does not exist or cannot be used, or a change is one of a key that varies.
     """
-    path = Path("sweep.toml") if isinstance(sweep, Mapping) else find_input(sweep, "sweep")
-    document, name = dict(sweep) if isinstance(sweep, Mapping) else read_toml(path), path.stem
-    source = "<sweep>" if isinstance(sweep, Mapping) else str(sweep)
+    if isinstance(sweep, Mapping):
+        document = dict(sweep)
+        source = "<sweep>"
+        name = "sweep"
+        folder = Path()
+    else:
+        path = find_input(sweep, "sweep")
+        document = read_toml(path)
+        source = str(sweep)
+        name = path.stem
+        folder = path.parent
     if changes:
         with attributed_to(source):
-            if not isinstance(document.get("set", {}), Mapping):
+            settings = document.get("set", {})
+            if not isinstance(settings, Mapping):
                 raise key_error("set", "expected a table of keys")
-            document = {**document, "set": {**flatten(document.get("set", {})), **changes}}
+            document = {**document, "set": {**flatten(settings), **changes}}
         name = _name_with(name, changes)
-    expanded = expand(document, source=source, name=name, folder=path.parent)
-    if varied := {key: value for key, value in (changes or {}).items() if key in expanded.keys}:
-        text = "varies in this sweep and cannot be set"
-        raise InputError(
-            source, [Problem(key, f'"{value}"', text) for key, value in varied.items()]
-        )
-    return expanded
+    definition = expand(document, source=source, name=name, folder=folder)
+    problems = []
+    for key, value in (changes or {}).items():
+        if key in definition.keys:
+            message = "varies in this sweep and cannot be set"
+            problems.append(Problem(key, f'"{value}"', message))
+    if problems:
+        raise InputError(source, problems)
+    return definition
 
 
 def _name_with(name: str, changes: Mapping[str, Value]) -> str:
-    """Name of a sweep with changes; it differs from the name without changes."""
-    text = ",".join(f"{key}={value}" for key, value in changes.items())
-    full = re.sub(r"[^\w.+=,-]+", "_", f"{name},{text}")
-    encoded = full.encode("utf-8", "surrogateescape")
+    """The name of a sweep with changes, which differs from the name without them."""
+    settings = ",".join(f"{key}={value}" for key, value in changes.items())
+    text = f"{name},{settings}"
+    full_name = re.sub(r"[^\w.+=,-]+", "_", text)
+    encoded = full_name.encode("utf-8", "surrogateescape")
     if len(encoded) <= _LONGEST_NAME:
-        return full
-    digest = hashlib.sha256(f"{name},{text}".encode("utf-8", "surrogateescape")).hexdigest()[:12]
-    return f"{encoded[: _LONGEST_NAME - 13].decode('utf-8', 'ignore')}@{digest}"  # with a hyphen it might be a run's
+        return full_name
+    digest = hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
+    start = encoded[: _LONGEST_NAME - _DIGITS_OF_DIGEST - 1].decode("utf-8", "ignore")
+    # Not with a hyphen, with which it might be the name of a run.
+    return f"{start}@{digest[:_DIGITS_OF_DIGEST]}"
 
 
 def expand(
@@ -176,53 +237,109 @@ def expand(
     folder: Path = Path(),
     base: tuple[str, Mapping[str, Any]] | None = None,
 ) -> SweepDefinition:
-    """Expand a sweep given as nested tables, with files that it names in a ``folder``.
+    """Expand the tables of a sweep file into its points.
 
-    With ``base``, the name of the base case and its tables, no file is read.
+    Parameters
+    ----------
+    document
+        The tables.
+    source
+        What messages call the sweep.
+    name
+        Name of the sweep.
+    folder
+        Where the base case is, and the files that the sweep names.
+    base
+        The name of the base case and its tables; no file of a case is read then.
+
+    Returns
+    -------
+    SweepDefinition
+        Its points are not resolved yet: `SweepDefinition.cases` validates them.
+
+    Raises
+    ------
+    InputError
+        If the sweep or the file of its base case cannot be used.
     """
     file = validated(SweepFile, document, source, "a sweep")
-    path = None if base else _base(file.case, source, folder)
+    if base is None:
+        path = _base_file(file.case, source, folder)
     try:
         with attributed_to(source):
-            axes, settings = file.all_axes(), flatten(file.set)
+            axes = file.all_axes()
+            settings = flatten(file.set)
             keys, rows = combinations(axes)
-            if "title" in keys:
-                raise key_error("title", "expected another key, for title does not determine a run")
-            apply_all(partial(check_key, CaseFile), (*settings, *keys))
-            for key in keys:
-                for alternative in alternatives(CaseFile, key) & {*keys}:
-                    raise key_error(
-                        key, f"expected one of {key} and {alternative}, which replace each other"
-                    )
-            case_name, given = (path.stem, read_case(path, folder)) if path else base or ("", {})
-            varied = (
-                pair
-                for axis in axes
-                for row in axis.rows
-                for pair in zip(axis.keys, row, strict=True)
-            )
-            given = with_files(given, folder, [*settings.items(), *varied])
-            tables = changed(CaseFile, given, settings)
+            _check_keys(settings, keys)
+            if base is None:
+                case_name = path.stem
+                base_tables: Mapping[str, Any] = read_case(path, folder)
+            else:
+                case_name, base_tables = base
+            values = [*settings.items(), *_values_of_axes(axes)]
+            base_tables = with_files(base_tables, folder, values)
+            tables = changed(CaseFile, base_tables, settings)
+            # Refuse keys that lead nowhere in the base case before all points are made.
             changed(CaseFile, tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
         raise input_error(source, "has infinitely nested tables") from error
-    until = file.descend.until_below if file.descend else None
-    return SweepDefinition(name, source, case_name, given, document, tables, axes, rows, until)
+    return SweepDefinition(
+        name=name,
+        source=source,
+        case_name=case_name,
+        base=base_tables,
+        file=document,
+        document=tables,
+        axes=axes,
+        rows=rows,
+        until_below=file.descend.until_below if file.descend else None,
+    )
 
 
-def _base(case: str, source: str, folder: Path) -> Path:
-    """The file of the base case: beside the sweep, with or without ``.toml``, or as a command finds it."""
-    names = [case] if case in shipped("case") else [case, f"{case}.toml"]
+def _check_keys(settings: Iterable[str], keys: Collection[str]) -> None:
+    """Refuse keys of ``[set]`` and of axes that no case has, and axes that exclude each other."""
+    if "title" in keys:
+        raise key_error("title", "expected another key, for title does not determine a run")
+    apply_all(partial(check_key, CaseFile), (*settings, *keys))
+    for key in keys:
+        for excluded in alternatives(CaseFile, key).intersection(keys):
+            message = f"expected one of {key} and {excluded}, which replace each other"
+            raise key_error(key, message)
+
+
+def _values_of_axes(axes: Iterable[Axis]) -> Iterator[tuple[str, Value]]:
+    """The values of all axes with their keys."""
+    for axis in axes:
+        for row in axis.rows:
+            yield from zip(axis.keys, row, strict=True)
+
+
+def _base_file(case: str, source: str, folder: Path) -> Path:
+    """The file of the base case.
+
+    It is beside the sweep, named with or without ``.toml``, or where a command finds it.
+    """
     try:
-        beside = (folder / name for name in names if case and (folder / name).is_file())
-        base = next(beside, None) or find_input(case or "no name", "case")
-        if base.is_dir():
-            raise input_error(base, "expected a case file, or the name of a shipped case")
-    except (OSError, InputError) as error:
-        why = (
-            error.problems[0].expected
-            if isinstance(error, InputError)
-            else f"cannot be read: {error.strerror}"
-        )
-        raise InputError(source, [Problem("case", f'"{case}"', why)]) from error
-    return base
+        path = _file_beside(case, folder) or find_input(case or "no name", "case")
+        if path.is_dir():
+            raise input_error(path, "expected a case file, or the name of a shipped case")
+    except InputError as error:
+        problem = Problem("case", f'"{case}"', error.problems[0].expected)
+        raise InputError(source, [problem]) from error
+    except OSError as error:
+        problem = Problem("case", f'"{case}"', f"cannot be read: {error.strerror}")
+        raise InputError(source, [problem]) from error
+    return path
+
+
+def _file_beside(case: str, folder: Path) -> Path | None:
+    """The case file of this name in a folder; None if there is none."""
+    if not case:
+        return None
+    names = [case]
+    if case not in shipped("case"):
+        names.append(f"{case}.toml")
+    for name in names:
+        if (folder / name).is_file():
+            return folder / name
+    return None

@@ -12,6 +12,7 @@ from walkers.files import read_limited
 from walkers.inputs.keys import parts_of, value_at
 
 _MOST_BYTES = 16 << 20
+"""Largest size of a TOML file."""
 
 
 def toml_bytes(tables: Mapping[str, Any]) -> bytes:
@@ -22,7 +23,13 @@ def toml_bytes(tables: Mapping[str, Any]) -> bytes:
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Read a TOML file; an `InputError` if it cannot be read, is no TOML, no regular file, or larger than 16 MB."""
+    """Read a TOML file.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is not TOML, not a regular file, or larger than 16 MB.
+    """
     try:
         contents = read_limited(path, _MOST_BYTES)
     except ValueError as error:
@@ -32,12 +39,10 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(contents.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
-        actual = f"byte {error.object[error.start]:#04x} at offset {error.start}"
-        raise input_error(path, f"expected UTF-8 text, found {actual}") from error
-    except (
-        ValueError,
-        RecursionError,
-    ) as error:  # TOML's own errors, integers of 5000 digits, brackets without end
+        byte = f"byte {error.object[error.start]:#04x} at offset {error.start}"
+        raise input_error(path, f"expected UTF-8 text, found {byte}") from error
+    except (ValueError, RecursionError) as error:
+        # Errors of TOML, but also integers of 5000 digits, and brackets that nest without end.
         raise input_error(path, f"not TOML: {error}") from error
 
 
@@ -66,14 +71,14 @@ def with_files(
         If a file cannot be read.
     """
     tables = dict(document)
-    values = list(values)
-    meshes = _unread(tables, "boundary.mesh", "meshes", values)
+    values_to_search = list(values)
+    meshes = _unread(tables, "boundary.mesh", "meshes", values_to_search)
     if meshes:
         from walkers.inputs.meshes.mesh_file import read_mesh
 
         contents = _read("boundary.mesh", meshes, folder, read_mesh)
         tables["meshes"] = _contents(tables, "meshes") | contents
-    records = _unread(tables, "drive.record", "records", values)
+    records = _unread(tables, "drive.record", "records", values_to_search)
     if records:
         from walkers.inputs.records.record_file import read_record
 
@@ -83,7 +88,7 @@ def with_files(
 
 
 def _contents(tables: Mapping[str, Any], table: str) -> dict[str, Any]:
-    """Contents of files that tables already have, by the names of the files."""
+    """The contents of files that tables already have, by the names of the files."""
     contents = tables.get(table)
     return dict(contents) if isinstance(contents, Mapping) else {}
 
@@ -94,12 +99,27 @@ def _unread(
     table: str,
     values: Sequence[tuple[str, object]],
 ) -> list[str]:
-    """Names of files that a key has, or may have, and whose contents are not in a table yet."""
-    named = [value_at(tables, parts_of(key))]
-    named += [value for name, value in values if name == key]
-    contents = _contents(tables, table)
-    unread = (name for name in named if isinstance(name, str) and name not in contents)
-    return list(dict.fromkeys(unread))
+    """Names of files that a key has, or may have, and whose contents are not in a table yet.
+
+    Parameters
+    ----------
+    tables
+        The tables of a case.
+    key
+        The dotted key whose values are names of files.
+    table
+        The table that has the contents of such files.
+    values
+        Further keys and their values.
+    """
+    candidates = [value_at(tables, parts_of(key))]
+    candidates += [value for value_key, value in values if value_key == key]
+    read = _contents(tables, table)
+    unread: list[str] = []
+    for name in candidates:
+        if isinstance(name, str) and name not in read and name not in unread:
+            unread.append(name)
+    return unread
 
 
 def _read(
@@ -108,7 +128,7 @@ def _read(
     folder: Path,
     read: Callable[[Path], Any],
 ) -> dict[str, Any]:
-    """Contents of files in a folder by their names; an unusable file is a problem of the key."""
+    """The contents of files in a folder, by name; an unusable file is a problem of the key."""
     contents: dict[str, Any] = {}
     for name in names:
         try:
