@@ -6,6 +6,7 @@ Files are found and read by `walkers.inputs.reading`.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from pydantic import ValidationError
@@ -20,6 +21,9 @@ from walkers.inputs.resolving.library import library_of
 from walkers.inputs.resolving.steps import resolve
 from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.toml import with_files
+
+_ROUNDING = 1e-9
+"""Share of a range by which a value may lie beyond its ends: it may be rounded."""
 
 
 def build_case(
@@ -43,8 +47,8 @@ def build_case(
     changes
         Values that replace those of the document, by dotted keys, written as in a case file.
     check_ranges
-        Whether uncertain ranges must contain the values of the case. Points of a sweep may leave
-        them.
+        Whether ranges of uncertain values must contain the values of the case. Points of a sweep
+        may leave them.
 
     Returns
     -------
@@ -55,11 +59,11 @@ def build_case(
     Raises
     ------
     InputError
-        If the document or a change is invalid, with all problems of the step that detects the first.
+        If the document or a change is invalid, with all problems of the step that fails first.
     """
     if changes:
         with attributed_to(source):
-            apply_all(lambda key: check_key(CaseFile, key), changes)
+            apply_all(partial(check_key, CaseFile), changes)
             document = changed(CaseFile, document, changes)
     with attributed_to(source, document):
         document = _with_record(with_files(document))
@@ -106,7 +110,7 @@ def changed_case(case: Case, changes: Mapping[str, Any]) -> Case:
 
 
 def stored_case(values: Mapping[str, Any]) -> Case:
-    """Read a case from what `Case.as_dict` returns, without keys of earlier versions of the program.
+    """Read a case from what `Case.as_dict` returns; keys of earlier versions are left out.
 
     Raises
     ------
@@ -117,66 +121,86 @@ def stored_case(values: Mapping[str, Any]) -> Case:
         return Case.model_validate(values, extra="ignore")
     except ValidationError as error:
         first = error.errors()[0]
-        raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+        place = ".".join(map(str, first["loc"]))
+        raise ValueError(f"{place}: {first['msg']}") from error
 
 
-def _with_record(document: dict[str, Any]) -> dict[str, Any]:
-    """The tables with the rows of the recorded shaking in the place of the name of its file."""
-    records = document.pop("records", {})
-    file = value_at(document, ("drive", "record"))
+def _with_record(document: Mapping[str, Any]) -> dict[str, Any]:
+    """The tables with the contents of the record in the place of the name of its file."""
+    tables = dict(document)
+    records = tables.pop("records", {})
+    file = value_at(tables, ("drive", "record"))
     if isinstance(file, str):
-        document["drive"] = {**document["drive"], "record": {"file": file, **records[file]}}
-    return document
+        tables["drive"] = {**tables["drive"], "record": {"file": file, **records[file]}}
+    return tables
 
 
 def _validated(tables: Mapping[str, Any], unknown: list[Problem], source: str) -> CaseFile:
     """The tables as a case file; ``unknown`` are problems of names that the library lacks."""
+    further = [*unknown, *contradictions(CaseFile, tables)]
     try:
-        return validated(
-            CaseFile, tables, source, further=[*unknown, *contradictions(CaseFile, tables)]
-        )
+        return validated(CaseFile, tables, source, further=further)
     except InputError as error:
-        # What the library would have given under another name is not missing too.
-        misnamed = unknown or any(
-            problem.key in NAMES and problem.value for problem in error.problems
-        )
-        hidden = SUPPLIED if misnamed else ()
-        kept = [problem for problem in error.problems if problem.value or problem.key not in hidden]
-        raise InputError(source, kept) from error
+        problems = list(error.problems)
+        if unknown or any(problem.key in NAMES and problem.value for problem in problems):
+            # A name is wrong: what the library would have given under another one is not missing.
+            problems = [
+                problem for problem in problems if problem.value or problem.key not in SUPPLIED
+            ]
+        raise InputError(source, problems) from error
 
 
 def _check_uncertain(
     case: Case, tables: Mapping[str, Any], source: str, *, check_ranges: bool
 ) -> None:
-    """Refuse uncertain values that are no keys, or whose ends the case could not have."""
+    """Refuse uncertain values that are no keys, or whose ranges the case could not have.
+
+    Parameters
+    ----------
+    case
+        The resolved case.
+    tables
+        The tables of its file, in which the ends of ranges are tried as values.
+    source
+        What messages call the case.
+    check_ranges
+        Whether the ranges must contain the values of the case.
+    """
     written = flatten(tables.get("uncertain", {}))
 
     def check(name: str) -> None:
         place = f"uncertain.{name}"
         try:
             low, high = _ends_of_range(name, case.uncertain[name], tables, source)
+            _check_has_value(case, name)
+            if check_ranges:
+                _check_contains_value(case, name, low, high)
         except NotARange as error:
             message = "expected [low, high] or { loguniform = [low, high] }"
             raise key_error(place, message, written[name]) from error
-        except InputError as error:  # of the key or of an end of its range
+        except InputError as error:  # its key is that of the case, and its value may be an end
             raise key_error(place, error.problems[0].expected, written[name]) from error
-        value = case.value_of(name)
-        if value is None:
-            instead = sorted(key for key in alternatives(CaseFile, name) if case.value_of(key))
-            if instead:
-                message = f"expected {' or '.join(instead)}, which the case has instead"
-                raise key_error(place, message, written[name])
-        slack = 1e-9 * (high - low)
-        if (
-            check_ranges
-            and isinstance(value, (int, float))
-            and not low - slack <= value <= high + slack
-        ):
-            text = next((origin.text for origin in case.origins if origin.key == name), str(value))
-            message = f"expected a range that holds the case's own value, {text}"
-            raise key_error(place, message, written[name])
 
     apply_all(check, case.uncertain)
+
+
+def _check_has_value(case: Case, name: str) -> None:
+    """Refuse an uncertain key for which the case has another one."""
+    if case.value_of(name) is not None:
+        return
+    instead = sorted(key for key in alternatives(CaseFile, name) if case.value_of(key))
+    if instead:
+        raise key_error(name, f"expected {' or '.join(instead)}, which the case has instead")
+
+
+def _check_contains_value(case: Case, name: str, low: Any, high: Any) -> None:
+    """Refuse a range of an uncertain key, in SI units, that does not contain its number."""
+    value = case.value_of(name)
+    slack = _ROUNDING * (high - low)
+    if isinstance(value, (int, float)) and not low - slack <= value <= high + slack:
+        texts = {origin.key: origin.text for origin in case.origins}
+        text = texts.get(name, str(value))
+        raise key_error(name, f"expected a range that holds the case's own value, {text}")
 
 
 def _ends_of_range(
@@ -185,11 +209,14 @@ def _ends_of_range(
     tables: Mapping[str, Any],
     source: str,
 ) -> tuple[Any, Any]:
-    """The ends of the range of an uncertain key, in SI units."""
+    """The ends of the range of an uncertain key, in SI units; each must be a value for the case."""
     check_key(CaseFile, name)
     if range_of(name, given).median is not None:
         raise key_error(name, "expected [low, high]: the case's own value is the median")
     (ends,) = given.values()
-    documents = (changed(CaseFile, tables, {name: end}) for end in ends)
-    low, high = (validated(CaseFile, document, source) for document in documents)
-    return low.value_of(name), high.value_of(name)
+    values = []
+    for end in ends:
+        file = validated(CaseFile, changed(CaseFile, tables, {name: end}), source)
+        values.append(file.value_of(name))
+    low, high = values
+    return low, high
