@@ -1,7 +1,7 @@
 """Laws of liquid bridges by the names that a case gives them: built-in laws and laws of users.
 
-A built-in law has a name of `walkers.physics.laws.LAWS`. A user's law is named ``path/to/file.py:function``. It is
-checked whenever it is evaluated (`walkers.inputs.user_law`).
+A built-in law has a name of `walkers.physics.laws.LAWS`. A user's law is named
+``path/to/file.py:function``. It is checked whenever it is evaluated (`walkers.inputs.user_law`).
 """
 
 from __future__ import annotations
@@ -23,31 +23,48 @@ class ExecutedLawWarning(UserWarning):
 
 
 def by_name(name: str) -> BridgeLaw:
-    """Find a law by name: one of `LAWS`, or ``file.py:function``, a path from the working directory.
+    """Find a law by name: one of `LAWS`, or ``path/to/file.py:function``.
 
-    A file is executed again only after it has changed. Raises `ValueError` if there is no law with this name, or its
-    file cannot be executed.
+    The path starts at the working directory. A file is executed again only after it has changed.
+
+    Raises
+    ------
+    ValueError
+        If there is no law of this name, or its file cannot be executed.
     """
-    if (file := source_of(name)) is None:
+    file = source_of(name)
+    if file is None:
         return built_in(name)
     return _of_user(name, file, source_sha256(name))
 
 
 def source_of(name: str) -> Path | None:
-    """The file of a user's law; None for a built-in law; errors as of `by_name`."""
+    """The file of a user's law, which need not exist; None for a built-in law.
+
+    Raises
+    ------
+    ValueError
+        If the name is neither that of a built-in law nor of the form ``file.py:function``.
+    """
     if name in LAWS:
         return None
     place, _, function = name.rpartition(":")
     if not place.endswith(".py") or not function or not name.isprintable():
-        raise ValueError(
-            f"bridge law {name!r}: expected one of {', '.join(LAWS)}, or file.py:function"
-        )
+        expected = f"one of {', '.join(LAWS)}, or file.py:function"
+        raise ValueError(f"bridge law {name!r}: expected {expected}")
     return Path(place).resolve()
 
 
 def source_sha256(name: str) -> str | None:
-    """SHA-256 of the file of a user's law; None for a built-in law; errors as of `by_name`. Nothing is executed."""
-    if (file := source_of(name)) is None:
+    """SHA-256 of the file of a user's law, which is not executed; None for a built-in law.
+
+    Raises
+    ------
+    ValueError
+        If there is no law of this name, or its file cannot be read.
+    """
+    file = source_of(name)
+    if file is None:
         return None
     try:
         return hashlib.sha256(file.read_bytes()).hexdigest()
@@ -57,12 +74,11 @@ def source_sha256(name: str) -> str | None:
 
 @lru_cache(maxsize=64)
 def _of_user(name: str, file: Path, sha256: str | None) -> BridgeLaw:
-    """A user's law with this content (``sha256``) of its file."""
-    from walkers.inputs.user_law import loaded
+    """The law in a user's file; the digest of its contents is there for the cache alone."""
+    from walkers.inputs.user_law import load_law
 
     del sha256
     if not file.is_relative_to(Path(__file__).parents[1]):
-        warnings.warn(
-            f"executes {file}, the bridge law of the case", ExecutedLawWarning, stacklevel=3
-        )
-    return loaded(name, file)
+        message = f"executes {file}, the bridge law of the case"
+        warnings.warn(message, ExecutedLawWarning, stacklevel=3)
+    return load_law(name, file)

@@ -14,13 +14,23 @@ _FARTHEST = 10.0
 """Largest rupture distance, in radii of the smaller bead."""
 
 
-def loaded(name: str, file: Path) -> BridgeLaw:
-    """The function of a file; its curves are checked (`_curve`).
+def load_law(name: str, file: Path) -> BridgeLaw:
+    """Execute a user's file and return its law, whose curves are checked whenever they are made.
 
-    Raises `ValueError` if there is none, or if its file raises an error or exits.
+    Parameters
+    ----------
+    name
+        The law as a case names it, ``path/to/file.py:function``.
+    file
+        The path of the file.
+
+    Raises
+    ------
+    ValueError
+        If the file has no such function, raises an error or exits.
     """
     function = name.rpartition(":")[2]
-    # Not as Python imports a file, which takes an edited one of the same length and second for the former one.
+    # Not imported: Python takes an edited file of the same length and second for the former one.
     law = _called(runpy.run_path, str(file)).get(function)
     if not callable(law):
         raise ValueError(f"bridge law {name!r}: {file} has no function {function}")
@@ -28,25 +38,27 @@ def loaded(name: str, file: Path) -> BridgeLaw:
 
 
 def _curve(law: BridgeLaw, surfaces: Surfaces) -> Curve:
-    """The curve of a law; `UnusableLawError` if it, or its forces, cannot be used, or it reaches beyond `_FARTHEST`."""
-    given = _called(law, surfaces)
-    if not isinstance(given, Curve):
-        raise UnusableLawError(
-            f"returns {type(given).__name__}; expected walkers.physics.bridge.Curve"
-        )
-    if given.rupture > (farthest := _FARTHEST * surfaces.radius):
-        raise UnusableLawError(
-            f"the bridge breaks at a gap of {given.rupture:g} m; expected at most {farthest:g} m"
-        )
+    """The curve that a law returns for two surfaces, with forces that are checked.
+
+    Raises `UnusableLawError` if it is not a curve, or its bridge breaks beyond `_FARTHEST`.
+    """
+    curve = _called(law, surfaces)
+    if not isinstance(curve, Curve):
+        returned = type(curve).__name__
+        raise UnusableLawError(f"returns {returned}; expected walkers.physics.bridge.Curve")
+    farthest = _FARTHEST * surfaces.radius
+    if curve.rupture > farthest:
+        breaks = f"the bridge breaks at a gap of {curve.rupture:g} m"
+        raise UnusableLawError(f"{breaks}; expected at most {farthest:g} m")
 
     def forces(gaps: FloatArray) -> Forces:
-        return Forces(*_called(columns_at, given, gaps).T)
+        return Forces(*_called(columns_at, curve, gaps).T)
 
-    return Curve(forces, given.rupture, given.formation, given.scale)
+    return Curve(forces, curve.rupture, curve.formation, curve.scale)
 
 
 def _called(function: Callable[..., Any], *arguments: object) -> Any:
-    """The value that a user's function returns; `UnusableLawError` for its errors, exits among them."""
+    """The value of a user's function; `UnusableLawError` if it raises an error or exits."""
     try:
         return function(*arguments)
     except (UnusableLawError, KeyboardInterrupt):
