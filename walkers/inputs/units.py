@@ -1,14 +1,13 @@
 """Physical quantities: strings with units are read as numbers in SI units.
 
-Units are those of pint, with two exceptions. Accelerations in ``g`` are in units of 9.8 m/s² (the paper), not grams.
-Radians are not pure numbers, so that "500 rad/s" is not read as 500 Hz.
+Units are those of pint, with two exceptions. Accelerations in ``g`` are in units of 9.8 m/s² (the
+paper), not grams. Radians are not pure numbers, so that "500 rad/s" is not read as 500 Hz.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from math import isfinite, pi
@@ -25,49 +24,72 @@ if TYPE_CHECKING:
     from pint import UnitRegistry
 
 ACCELERATION_OF_ONE_G = 9.8
-"""m/s²; "1 g = 9.8 m/s²" in the caption of Fig. 1 of Khan et al., *Self-assembled granular walkers*."""
+"""m/s²; "1 g = 9.8 m/s²" (caption of Fig. 1 of Khan et al., *Self-assembled granular walkers*)."""
 
-# pint's own expression parser reads "0,3 mm" as 0 mm and "0.3 mm; 2" as 0.6 mm: only its unit parser is used.
+# Only pint's unit parser is used: its parser of expressions reads "0,3 mm" as 0 mm and "0.3 mm; 2"
+# as 0.6 mm.
 _NUMBER_AND_UNIT = re.compile(
     r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s%,;][^%,;]*)"
 )
-_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[^\d\s%,;]"  # the begin of a quantity, for editors
+_PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[^\d\s%,;]"
+"""Start of a quantity, for editors."""
 _GRAM_SYMBOL = re.compile(r"(?<![A-Za-z_])g(?![A-Za-z_0-9])")
+"""The unit g alone, as in "g" or "m*g", but not in "kg"."""
 _ANGLE_UNITS = frozenset({"degree", "radian", "milliradian", "arcminute", "arcsecond"})
+"""Pint's names of the units of angles."""
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
+"""Prefixes of units and their factors."""
 _PREFIXED = ("m", "Hz", "m/s", "s", "rad", "N/m", "Pa*s", "Pa")
-_USUAL: Mapping[str, tuple[str, float]] = {
-    **{
-        f"{prefix}{unit}": (unit, factor)
-        for unit in _PREFIXED
-        for prefix, factor in _PREFIXES.items()
-    },
-    **{"cm": ("m", 1e-2), "deg": ("rad", pi / 180.0)},
-    **{"g": ("m/s^2", ACCELERATION_OF_ONE_G), "m/s^2": ("m/s^2", 1.0), "m/s²": ("m/s^2", 1.0)},
-    **{
+"""Units that usually have prefixes."""
+
+
+def _usual_units() -> dict[str, tuple[str, float]]:
+    """Usual units with their SI units and their values in these, as in pint."""
+    units = {
+        "cm": ("m", 1e-2),
+        "deg": ("rad", pi / 180.0),
+        "g": ("m/s^2", ACCELERATION_OF_ONE_G),
+        "m/s^2": ("m/s^2", 1.0),
+        "m/s²": ("m/s^2", 1.0),
         "kg/m^3": ("kg/m^3", 1.0),
         "kg/m³": ("kg/m^3", 1.0),
         "g/cm^3": ("kg/m^3", 1e3),
         "g/cm³": ("kg/m^3", 1e3),
-    },
-    **{
         "m^2/s": ("m^2/s", 1.0),
         "m²/s": ("m^2/s", 1.0),
         "mm^2/s": ("m^2/s", 1e-6),
         "mm²/s": ("m^2/s", 1e-6),
-    },
-}
-"""Usual units in SI units, as in pint; cases with only these units do not import pint."""
+    }
+    for unit in _PREFIXED:
+        for prefix, factor in _PREFIXES.items():
+            units[f"{prefix}{unit}"] = (unit, factor)
+    return units
+
+
+_USUAL: Mapping[str, tuple[str, float]] = _usual_units()
+"""Usual units; a case with only these units does not import pint, which takes time."""
 _ZEROS: Mapping[str, float] = {"K": 0.0, "degC": 273.15, "°C": 273.15}
 """Zero points of temperature units, K."""
 
 
 @dataclass(frozen=True)
 class QuantityKind:
-    """Kind of a quantity: name, SI unit, example for messages, and wide physical bounds of its magnitude.
+    """Kind of a quantity. As an annotation of a float, it makes pydantic read text with a unit.
 
-    ``sign`` is the accepted one in files: ``more than zero``, ``zero or more``, or anything. As an annotation of a
-    float, a kind makes pydantic read text with a unit.
+    Attributes
+    ----------
+    name
+        Its name in messages.
+    unit
+        Its SI unit.
+    example
+        An example for messages.
+    largest
+        Wide physical bound of its magnitude, in the SI unit.
+    smallest
+        Lower bound of its magnitude, except for zero.
+    sign
+        The sign that files may have: `POSITIVE`, `NOT_NEGATIVE`, or empty for any.
     """
 
     name: str
@@ -79,7 +101,7 @@ class QuantityKind:
 
     @property
     def expectation(self) -> str:
-        """The end of an error message."""
+        """What a message says is expected."""
         article = "an" if self.name[0] in "aeiou" else "a"
         return f'expected {article} {self.name} with its unit, such as "{self.example}"'
 
@@ -91,7 +113,7 @@ class QuantityKind:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """A text with a unit, for editors that check case files."""
+        """The JSON schema, for editors that check case files: text with a unit."""
         return {
             "type": "string",
             "pattern": _PATTERN,
@@ -100,6 +122,7 @@ class QuantityKind:
         }
 
     def _read(self, value: object, validation: ValidationInfo) -> object:
+        """Text with a unit as a number; a number stays as it is, but a user must give a unit."""
         if not isinstance(value, str):
             if validation.context == WRITTEN:
                 raise ValueError(self.expectation)
@@ -111,25 +134,57 @@ class QuantityKind:
 
 
 def parse_quantity(text: str, kind: QuantityKind) -> float:
-    """Read a quantity of a kind, such as ``"0.3 mm"``, in SI units; raises `ValueError` if it is something else."""
+    """Read a quantity of a kind, such as ``"0.3 mm"``.
+
+    Parameters
+    ----------
+    text
+        A number with its unit.
+    kind
+        The kind that it must have.
+
+    Returns
+    -------
+    float
+        The number in SI units.
+
+    Raises
+    ------
+    ValueError
+        If the text is no quantity, or one of another kind, or beyond the bounds of the kind.
+    """
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:
         raise ValueError(kind.expectation)
-    symbol, zero = match["unit"], _ZEROS.get(match["unit"], 0.0)
-    of_temperature = kind.unit == TEMPERATURE.unit and symbol in _ZEROS
-    usual = (kind.unit, 1.0) if of_temperature else _USUAL.get(symbol)
-    unit, factor = usual or (kind.unit, _by_pint(symbol, kind))
-    if unit != kind.unit:
-        raise ValueError(kind.expectation)
+    symbol = match["unit"]
+    factor = _factor_of(symbol, kind)
+    zero = _ZEROS.get(symbol, 0.0)
     # Rounded: 4.0 g/cm³ is 4000 kg/m³, not 3999.9999999999995.
     value = float(f"{float(match['number']) * factor + zero:.15g}")
     if value != 0.0 and not kind.smallest <= abs(value) <= kind.largest:
-        low, high = (
-            f"{float(f'{(bound - zero) / factor:.4g}'):g}"
-            for bound in (kind.smallest, kind.largest)
-        )
+        low = _bound_text(kind.smallest, factor, zero)
+        high = _bound_text(kind.largest, factor, zero)
         raise ValueError(f"{kind.expectation}; it must lie between {low} and {high} {symbol}")
     return value
+
+
+def _factor_of(symbol: str, kind: QuantityKind) -> float:
+    """The value of a unit in the SI unit of a kind; `ValueError` for a unit of another kind."""
+    if kind.unit == TEMPERATURE.unit and symbol in _ZEROS:
+        return 1.0
+    usual = _USUAL.get(symbol)
+    if usual is None:
+        return _factor_by_pint(symbol, kind)
+    unit, factor = usual
+    if unit != kind.unit:
+        raise ValueError(kind.expectation)
+    return factor
+
+
+def _bound_text(bound: float, factor: float, zero: float) -> str:
+    """A bound in SI units as text in another unit, rounded to four digits."""
+    rounded = f"{(bound - zero) / factor:.4g}"
+    return f"{float(rounded):g}"
 
 
 @cache
@@ -146,20 +201,19 @@ def _registry() -> UnitRegistry[float]:
 
 
 @lru_cache(maxsize=1024)  # a sweep reads thousands of quantities in the same few units
-def _by_pint(symbol: str, kind: QuantityKind) -> float:
-    """Conversion factor of an unusual unit to the SI unit of the kind."""
+def _factor_by_pint(symbol: str, kind: QuantityKind) -> float:
+    """The value of an unusual unit in the SI unit of a kind."""
     if kind.unit == TEMPERATURE.unit:
         raise ValueError(kind.expectation)
     units = _registry()
+    if kind.unit == ACCELERATION.unit:
+        symbol = _GRAM_SYMBOL.sub("gee", symbol)
     try:
-        unit = units.parse_units(
-            _GRAM_SYMBOL.sub("gee", symbol) if kind.unit == ACCELERATION.unit else symbol
-        )
+        unit = units.parse_units(symbol)
         factor = float(units.Quantity(1.0, unit).to(kind.unit).magnitude)
         root = str(units.Quantity(1.0, unit).to_root_units().units)
-    except (
-        Exception
-    ) as error:  # pint's parser raises a dozen types, the tokenizer's errors among them
+    except Exception as error:
+        # Pint's parser raises a dozen types of errors, those of Python's tokenizer among them.
         raise ValueError(kind.expectation) from error
     # Pint treats radians as pure numbers.
     if kind.unit == ANGLE.unit and str(unit) not in _ANGLE_UNITS:
@@ -171,54 +225,70 @@ def _by_pint(symbol: str, kind: QuantityKind) -> float:
 
 def as_quantity(value: Any) -> tuple[float, str | None] | None:
     """A value as number and unit (None: a plain number); None if it is not a finite number."""
-    match = _NUMBER_AND_UNIT.fullmatch(value.strip()) if isinstance(value, str) else None
-    if not match and (isinstance(value, bool) or not isinstance(value, (int, float))):
+    unit = None
+    if isinstance(value, str):
+        match = _NUMBER_AND_UNIT.fullmatch(value.strip())
+        if match is None:
+            return None
+        number = float(match["number"])
+        unit = match["unit"].strip()
+    elif isinstance(value, bool) or not isinstance(value, (int, float)):
         return None
-    with suppress(OverflowError):  # an integer of hundreds of digits
-        number, unit = (
-            (float(match["number"]), match["unit"].strip()) if match else (float(value), None)
-        )
-        return (number, unit) if isfinite(number) else None
-    return None
+    else:
+        try:
+            number = float(value)
+        except OverflowError:  # an integer of hundreds of digits
+            return None
+    return (number, unit) if isfinite(number) else None
 
 
 def quantity_text(value: float, kind: QuantityKind) -> str:
     """A number in SI units as text in the unit of the kind's example."""
     unit = _NUMBER_AND_UNIT.fullmatch(kind.example)["unit"]  # type: ignore[index]
-    return f"{(value - _ZEROS.get(unit, 0.0)) / _USUAL.get(unit, ('', 1.0))[1]:.6g} {unit}"
+    zero = _ZEROS.get(unit, 0.0)
+    _, factor = _USUAL.get(unit, ("", 1.0))
+    return f"{(value - zero) / factor:.6g} {unit}"
 
 
 def kind_in(annotations: Iterable[Any]) -> QuantityKind | None:
-    """The kind of quantity that a field of a table holds, by its metadata and annotation; or None."""
+    """The kind of quantity of a field, by its metadata and annotation; None if it has none."""
     for annotation in annotations:
-        if (
-            kind := annotation
-            if isinstance(annotation, QuantityKind)
-            else kind_in(get_args(annotation))
-        ) is not None:
+        if isinstance(annotation, QuantityKind):
+            return annotation
+        kind = kind_in(get_args(annotation))
+        if kind is not None:
             return kind
     return None
 
 
-POSITIVE, NOT_NEGATIVE = "more than zero", "zero or more"
+POSITIVE = "more than zero"
+"""Sign of a quantity, as messages say it."""
+NOT_NEGATIVE = "zero or more"
+"""Sign of a quantity, as messages say it."""
 WRITTEN = "written"
 """Context for the validation of user input, which refuses quantities without units."""
 
-LENGTH = QuantityKind("length", "m", "0.3 mm", 1.0, 1e-9, POSITIVE)
-FREQUENCY = QuantityKind("frequency", "Hz", "80 Hz", 1e6, 1e-2, POSITIVE)
-ACCELERATION = QuantityKind("acceleration", "m/s^2", "4 g", 1e4, 1e-9, NOT_NEGATIVE)
-SPEED = QuantityKind("speed", "m/s", "0.02 mm/s", 1e4, 1e-12, POSITIVE)
-TIME = QuantityKind("time", "s", "2 us", 1.0, 1e-12, POSITIVE)
-DURATION = QuantityKind("duration", "s", "4 s", 1e4, 1e-6, POSITIVE)
-ANGLE = QuantityKind("angle", "rad", "10 deg", 1e3)
-DENSITY = QuantityKind("density", "kg/m^3", "4.0 g/cm^3", 1e5, 1.0, POSITIVE)
-SURFACE_TENSION = QuantityKind("surface tension", "N/m", "19.2 mN/m", 10.0, 1e-9, POSITIVE)
-KINEMATIC_VISCOSITY = QuantityKind(
-    "kinematic viscosity", "m^2/s", "5 mm^2/s", 10.0, sign=NOT_NEGATIVE
+LENGTH = QuantityKind("length", "m", "0.3 mm", largest=1.0, smallest=1e-9, sign=POSITIVE)
+FREQUENCY = QuantityKind("frequency", "Hz", "80 Hz", largest=1e6, smallest=1e-2, sign=POSITIVE)
+ACCELERATION = QuantityKind(
+    "acceleration", "m/s^2", "4 g", largest=1e4, smallest=1e-9, sign=NOT_NEGATIVE
 )
-DYNAMIC_VISCOSITY = QuantityKind("dynamic viscosity", "Pa*s", "4.6 mPa*s", 1e4, sign=NOT_NEGATIVE)
-MODULUS = QuantityKind("modulus", "Pa", "50 MPa", 1e13, 1e3, POSITIVE)
-TEMPERATURE = QuantityKind("temperature", "K", "20 degC", 373.15, 273.15)
+SPEED = QuantityKind("speed", "m/s", "0.02 mm/s", largest=1e4, smallest=1e-12, sign=POSITIVE)
+TIME = QuantityKind("time", "s", "2 us", largest=1.0, smallest=1e-12, sign=POSITIVE)
+DURATION = QuantityKind("duration", "s", "4 s", largest=1e4, smallest=1e-6, sign=POSITIVE)
+ANGLE = QuantityKind("angle", "rad", "10 deg", largest=1e3)
+DENSITY = QuantityKind("density", "kg/m^3", "4.0 g/cm^3", largest=1e5, smallest=1.0, sign=POSITIVE)
+SURFACE_TENSION = QuantityKind(
+    "surface tension", "N/m", "19.2 mN/m", largest=10.0, smallest=1e-9, sign=POSITIVE
+)
+KINEMATIC_VISCOSITY = QuantityKind(
+    "kinematic viscosity", "m^2/s", "5 mm^2/s", largest=10.0, sign=NOT_NEGATIVE
+)
+DYNAMIC_VISCOSITY = QuantityKind(
+    "dynamic viscosity", "Pa*s", "4.6 mPa*s", largest=1e4, sign=NOT_NEGATIVE
+)
+MODULUS = QuantityKind("modulus", "Pa", "50 MPa", largest=1e13, smallest=1e3, sign=POSITIVE)
+TEMPERATURE = QuantityKind("temperature", "K", "20 degC", largest=373.15, smallest=273.15)
 
 Length = Annotated[float, LENGTH]
 Radius = Annotated[float, replace(LENGTH, largest=0.02, smallest=1e-6)]
