@@ -14,19 +14,20 @@ unless the record repeats.
 With p rows a period, the spline of a sine is off by (2π/p)⁴/384 of its peak: 4e-5 with 18 rows,
 2e-10 with 400.
 
-Files are read in `walkers.inputs.records.record_file`.
+Files are read in `walkers.inputs.records.record_file`. The numerics of sampled signals are in
+`walkers.inputs.records.signals`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from math import asin, degrees
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 
-from walkers.arrays import FloatArray
+from walkers.arrays import BoolArray, FloatArray
 from walkers.inputs.config_table import SAME_RUN, ConfigTable
 from walkers.inputs.records.signals import (
     ComplexArray,
@@ -43,51 +44,74 @@ from walkers.rounding import counted
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
 
-FEWEST, MOST = 16, 100_000
-"""Numbers of rows."""
+FEWEST_ROWS = 16
+"""Smallest number of rows of a record."""
+MOST_ROWS = 100_000
+"""Largest number of rows of a record."""
 FEWEST_PERIODS = 3.0
 """Shortest record that does not repeat, in periods of its strongest line."""
-WINDOW = 8
-"""Periods of the strongest line in a window for the local amplitude."""
-_SLOW = 4  # periods of the slowest line in a window for the slow part of the displacement
+AMPLITUDE_WINDOW_PERIODS = 8
+"""Width of the window for the local amplitude, in periods of the strongest line."""
 STATIONARY = 0.1
 """Largest difference of local amplitudes of a stationary record, over the largest one."""
-_UNEVEN = (
-    1.5  # longest time between two rows, in medians of all; longer where single rows are lost …
-)
-_LOST = 2.5  # … up to this one …
-_MOST_LOST = 0.01  # … and for this share of all rows
-_REPEATED = 0.05  # share of times that repeat, from which on they have too few digits
-_WHOLE = 1e-3  # error of the number of periods: a record ends after whole ones if it nearly does
-_COARSE = 0.1  # largest change by leaving out every second row, root mean square; a sine does with six rows a period
-_FAINT = 0.05  # share of the strongest amplitude in the spectrum below which others do not count
-_BEATS = 16  # fewest beats of two lines in a record; the amplitude of one with fewer changes slowly
-_CONSTANT = 1e-9  # change of a dead sensor, over its value
-_TILT = (
-    1.75e-3 * ACCELERATION_OF_ONE_G
-)  # acceleration along a substrate that is tilted by 0.1°, m/s²
-_DISPLACEMENTS = (
-    1e-9,
-    1.0,
-)  # smallest and largest amplitude of an electrodynamic shaker, with a margin, m
+_SLOW_WINDOW_PERIODS = 4
+"""Width of the window for the slow part of the displacement, in periods of the slowest line."""
+_UNEVEN_STEP = 1.5
+"""Longest time between two rows, in medians of all of them, unless single rows are lost."""
+_LOST_STEP = 2.5
+"""Longest time between two rows between which one is lost, in medians of all of them."""
+_LARGEST_LOST_SHARE = 0.01
+"""Largest number of lost rows, over that of all rows."""
+_LARGEST_REPEATED_SHARE = 0.05
+"""Share of times that repeat, above which the times have too few digits."""
+_WHOLE_PERIODS_ERROR = 1e-3
+"""A number of periods that differs by less from a whole number is taken for whole."""
+_LARGEST_COARSENESS = 0.1
+"""Largest relative change of the acceleration (root mean square) by leaving out every second row.
+
+A sine with six rows a period changes by as much.
+"""
+_FAINT_SHARE = 0.05
+"""Amplitude in the spectrum below which a line does not count, over that of the strongest one."""
+_FEWEST_BEATS = 16
+"""Smallest number of beats of two lines in a record; with fewer, the amplitude changes slowly."""
+_CONSTANT_SHARE = 1e-9
+"""Largest change of the acceleration of a dead sensor, over its value."""
+_TILT = 1.75e-3 * ACCELERATION_OF_ONE_G
+"""Acceleration along a substrate that is tilted by 0.1°, m/s²."""
+_SMALLEST_DISPLACEMENT = 1e-9
+"""Smallest amplitude of an electrodynamic shaker, with a margin, m."""
+_LARGEST_DISPLACEMENT = 1.0
+"""Largest amplitude of an electrodynamic shaker, with a margin, m."""
+_POWERS_IN_TEXT = 6
+"""Number of coefficients of each piece of a course, as the engine reads it."""
 
 
 class Record(ConfigTable):
-    """The rows of a file: time (s), acceleration along x, y and z (m/s²).
+    """The rows of a file of recorded shaking.
 
-    ``repeats`` says whether they are a period, which repeats. ``ignored_columns`` are the names of
-    columns of the file that are neither a time nor an acceleration.
+    Attributes
+    ----------
+    file
+        Name of the file, as the case has it.
+    rows
+        Time, s, and acceleration along x, y and z, m/s².
+    repeats
+        Whether the rows are a period, which repeats, as the key of the drive says.
+    ignored_columns
+        Names of the columns of the file that are neither a time nor an acceleration.
     """
 
     file: Annotated[str, SAME_RUN] = ""
     rows: tuple[tuple[float, float, float, float], ...]
-    repeats: Annotated[bool, SAME_RUN] = False  # as the key of the drive says
+    repeats: Annotated[bool, SAME_RUN] = False
     ignored_columns: Annotated[tuple[str, ...], SAME_RUN] = ()
 
     @cached_property
     def course(self) -> PPoly:
         """Displacement along x, y and z, m, against the time since the first row, s."""
-        course = _without_offset(np.array(self.rows), self.repeats).antiderivative(2)
+        course = _without_offset(np.array(self.rows), repeats=self.repeats).antiderivative(2)
+        # The velocity that no bead feels brings the displacement back to zero at the end.
         drift = course(course.x[-1]) / course.x[-1]
         course.c[-2] -= drift
         course.c[-1] -= drift * course.x[:-1, None]
@@ -95,19 +119,19 @@ class Record(ConfigTable):
 
     @cached_property
     def slow_course(self) -> PPoly | None:
-        """The slow part of the displacement along x, y and z, m, against time, s; None if the record repeats.
+        """The slow part of the displacement along x, y and z, m, against time, s.
 
-        The error of a sensor, integrated twice, grows to millimetres within a second. What changes
-        slowly compared with four periods of the slowest line is no shaking, and no bead feels it:
-        amplitudes and pictures leave it out (`walkers.inputs.records.signals.slow_part`). The run contains
-        it.
+        None if the record repeats. The error of a sensor, integrated twice, grows to millimetres
+        within a second. What changes slowly compared with four periods of the slowest line is no
+        shaking, and no bead feels it: amplitudes and pictures leave it out
+        (`walkers.inputs.records.signals.slow_part`). The run contains it.
         """
         from scipy.interpolate import CubicSpline
 
         if self.repeats:
             return None
         count = len(self.rows)
-        width = int(min(_SLOW / self._lines[0], 1.0) * count)
+        width = int(min(_SLOW_WINDOW_PERIODS / self._line_periods[0], 1.0) * count)
         time = np.linspace(0.0, self.length, count)
         slow = slow_part(self.course(time), width)
         nodes = np.unique(np.linspace(0, count - 1, 4 + 16 * count // width).astype(np.int64))
@@ -121,59 +145,86 @@ class Record(ConfigTable):
     @property
     def axes(self) -> dict[str, int]:
         """The axes that are shaken, and their places among x, y and z."""
-        return {
-            axis: place
-            for place, axis in enumerate("xyz")
-            if any(row[1 + place] for row in self.rows)
-        }
+        return {axis: place for place, axis in enumerate("xyz") if self._is_shaken(place)}
+
+    def _is_shaken(self, place: int) -> bool:
+        """Whether any row has an acceleration along an axis, by its place among x, y and z."""
+        return any(row[1 + place] for row in self.rows)
 
     def largest(self, order: int) -> float:
-        """Largest displacement (order 0, m), velocity (1, m/s) or acceleration (2, m/s²) of the spline.
+        """Largest displacement, velocity or acceleration of the spline.
 
         It is the largest length of the vector, at the rows and at three times between any two: with
         six rows a period, the rows alone miss the peak of a sine by up to 13 %. Displacement and
         velocity are without their slow part, which is uncertain near both ends of a record: they
         are not evaluated there.
+
+        Parameters
+        ----------
+        order
+            0 for the displacement, m, 1 for the velocity, m/s, or 2 for the acceleration, m/s².
         """
         rows = np.arange(len(self.course.x))
         time = np.interp(np.arange(0.0, rows[-1] + 0.125, 0.25), rows, self.course.x)
         if order < 2 and not self.repeats:
-            margin = min(_SLOW / self._lines[0], 0.4) * self.length
+            margin = min(_SLOW_WINDOW_PERIODS / self._line_periods[0], 0.4) * self.length
             time = time[(time >= margin) & (time <= self.length - margin)]
         return float(np.linalg.norm(self.shaking(time, order), axis=1).max())
 
     def shaking(self, time: FloatArray, order: int = 0) -> FloatArray:
-        """Displacement without its slow part (order 0, m), velocity (1) or acceleration (2) at times (s), (N, 3)."""
-        values = self.course(time, order, extrapolate=self._beyond)
+        """Displacement without its slow part, or its time derivative.
+
+        Parameters
+        ----------
+        time : ndarray, shape (N,)
+            Times since the first row, s.
+        order
+            0 for the displacement, 1 for the velocity, or 2 for the acceleration, of which the slow
+            part is not taken away.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
+            Components along x, y and z in m, m/s or m/s².
+        """
+        values = self.course(time, order, extrapolate=self._extrapolation)
         if order < 2 and self.slow_course is not None:
             values = values - self.slow_course(time, order)
         return np.asarray(values)
 
     @cached_property
     def farthest(self) -> float:
-        """Largest displacement at the rows with its slow part, m: how far the walls move in the frame ``lab``."""
+        """Largest displacement at the rows with its slow part, m.
+
+        The walls move by it in the frame of reference ``lab``.
+        """
         return float(np.linalg.norm(self.course(self.course.x), axis=1).max())
 
     @cached_property
     def direction(self) -> tuple[float, float, float]:
         """Direction in which the acceleration has its largest root mean square, a unit vector."""
         acceleration = self.course(self.course.x, 2)
-        axis = np.linalg.eigh(acceleration.T @ acceleration)[1][:, -1]
+        _, vectors = np.linalg.eigh(acceleration.T @ acceleration)
+        axis = vectors[:, -1]
         x, y, z = (axis * np.sign(axis[np.argmax(np.abs(axis))])).tolist()
         return (x, y, z)
 
     @cached_property
-    def _even(self) -> FloatArray:
+    def _even_samples(self) -> FloatArray:
         """The acceleration at as many even times as there are rows, m/s², shape (N, 3)."""
         count = len(self.rows)
         return np.asarray(self.course(np.arange(count) * self.length / count, 2))
 
     @cached_property
     def _phasors(self) -> ComplexArray:
-        """Spectrum of the acceleration along x, y and z by the number of periods in the record, m/s², shape (K, 3)."""
+        """Spectrum of the acceleration along x, y and z, m/s², shape (K, 3).
+
+        Row k is the component with k periods in the record.
+        """
         count = len(self.rows)
         window = np.ones((count, 1)) if self.repeats else np.hanning(count + 1)[:-1, None]
-        return np.asarray(np.fft.rfft(self._even * window, axis=0) * 2.0 / window.mean() / count)
+        spectrum = np.fft.rfft(self._even_samples * window, axis=0)
+        return np.asarray(spectrum * 2.0 / window.mean() / count)
 
     @cached_property
     def _spectrum(self) -> FloatArray:
@@ -181,70 +232,93 @@ class Record(ConfigTable):
         return np.asarray(np.linalg.norm(self._phasors, axis=1))
 
     @cached_property
-    def _strongest(self) -> int:
-        """Periods in the record of the strongest line."""
+    def _strongest_periods(self) -> int:
+        """Number of periods of the strongest line in the record."""
         return int(self._spectrum[1:].argmax()) + 1
 
     @cached_property
-    def _lines(self) -> list[int]:
-        """Periods in the record of its lines: maxima of the spectrum from two periods on that are not faint."""
+    def _line_periods(self) -> list[int]:
+        """Number of periods of each line in the record, increasing.
+
+        Lines are maxima of the spectrum, from two periods on, that are not faint.
+        """
         spectrum = self._spectrum
-        strong = _FAINT * spectrum[1:].max()
-        lines = [
-            number
-            for number in range(2, len(spectrum) - 1)
-            if spectrum[number] > strong
-            and spectrum[number - 1] <= spectrum[number] > spectrum[number + 1]
-        ]
-        return lines or [self._strongest]
+        strong = _FAINT_SHARE * spectrum[1:].max()
+        periods = []
+        for number in range(2, len(spectrum) - 1):
+            is_maximum = spectrum[number - 1] <= spectrum[number] > spectrum[number + 1]
+            if is_maximum and spectrum[number] > strong:
+                periods.append(number)
+        return periods or [self._strongest_periods]
 
     @cached_property
     def strongest_line(self) -> float:
         """Frequency of the strongest line of the spectrum, Hz."""
-        peak = self._strongest
+        peak = self._strongest_periods
         if self.repeats:
             return peak / self.length
+        # A parabola through the logarithms of the spectrum, and then the phase of the line.
         least = np.finfo(np.float64).tiny
         left, top, right = np.log(np.maximum(self._spectrum[peak - 1 : peak + 2], least))
         periods = peak + 0.5 * float((left - right) / (left - 2.0 * top + right))
-        periods = periods_by_phase(self._even, periods)
-        whole = round(periods)
-        return (whole if abs(periods - whole) < _WHOLE else periods) / self.length
+        periods = periods_by_phase(self._even_samples, periods)
+        whole_periods = round(periods)
+        if abs(periods - whole_periods) < _WHOLE_PERIODS_ERROR:
+            return whole_periods / self.length
+        return periods / self.length
 
     @cached_property
     def frequencies(self) -> tuple[float, float]:
-        """Frequency of a cycle (of all lines, if the record repeats; else the strongest), and the highest one, Hz."""
-        high = np.flatnonzero(self._spectrum > _FAINT * self._spectrum[1:].max())
-        fastest = float(high[-1]) / self.length
+        """Frequency of a cycle, and the highest frequency, Hz.
+
+        The cycle is that of all lines if the record repeats, or else of the strongest one.
+        """
+        periods = np.flatnonzero(self._spectrum > _FAINT_SHARE * self._spectrum[1:].max())
+        highest = float(periods[-1]) / self.length
+        cycle = self.strongest_line
         if self.repeats:
-            return float(np.gcd.reduce(high)) / self.length, fastest
-        return self.strongest_line, fastest
+            cycle = float(np.gcd.reduce(periods)) / self.length
+        return cycle, highest
 
     @cached_property
     def _amplitudes(self) -> FloatArray:
-        """Local amplitude at the times of `_even`, m/s²."""
+        """Local amplitude at the times of `_even_samples`, m/s², shape (N,)."""
         count = len(self.rows)
         if self.repeats:
-            return np.full(count, longest(self._phasors[[self._strongest]])[0])
+            return np.full(count, longest(self._phasors[[self._strongest_periods]])[0])
         periods = self.strongest_line * self.length
-        width = WINDOW / periods
-        # Beats with another line, which come and go within a few cycles, are no change of the amplitude.
-        beats = [abs(line - periods) for line in self._lines]
-        fewest = min((number for number in beats if number >= _BEATS), default=count)
-        width = max(width, 2.0 / fewest)
-        return local_amplitude(self._even, periods / count, max(int(width * count), 2))
+        width = AMPLITUDE_WINDOW_PERIODS / periods
+        # Beats with another line come and go within a few cycles: the amplitude does not change.
+        fewest_beats = count
+        for line_periods in self._line_periods:
+            beats = abs(line_periods - periods)
+            if beats >= _FEWEST_BEATS:
+                fewest_beats = min(beats, fewest_beats)
+        width = max(width, 2.0 / fewest_beats)
+        samples_in_window = max(int(width * count), 2)
+        return local_amplitude(self._even_samples, periods / count, samples_in_window)
 
     def local_amplitude(self, time: FloatArray) -> FloatArray:
-        """Local amplitude of the acceleration at times (s), m/s², shape (N,).
+        """Local amplitude of the acceleration.
 
         This is the amplitude of the strongest line of the spectrum in a Hann window of eight of its
         periods, as a lock-in amplifier measures it: noise, harmonics and other lines do not count.
         The window is two beats of the strongest line with the nearest other one, if these are
         longer. In the half window at either end, the amplitude is that of the first or last whole
         window. A record that repeats has one amplitude.
+
+        Parameters
+        ----------
+        time : ndarray, shape (N,)
+            Times since the first row, s.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            In m/s².
         """
-        even = np.arange(len(self.rows)) * self.length / len(self.rows)
-        return np.interp(time, even, self._amplitudes)
+        even_times = np.arange(len(self.rows)) * self.length / len(self.rows)
+        return np.interp(time, even_times, self._amplitudes)
 
     @property
     def is_stationary(self) -> bool:
@@ -258,77 +332,111 @@ class Record(ConfigTable):
         return float(self._amplitudes.min()), float(self._amplitudes.max())
 
     def motion(self, time: FloatArray) -> FloatArray:
-        """Displacement, velocity and acceleration along x, y and z at times (s), shape (3, N, 3)."""
-        return np.stack([self.course(time, order, extrapolate=self._beyond) for order in range(3)])
+        """Displacement, m, velocity, m/s, and acceleration, m/s², along x, y and z.
+
+        Parameters
+        ----------
+        time : ndarray, shape (N,)
+            Times since the first row, s.
+
+        Returns
+        -------
+        ndarray, shape (3, N, 3)
+            The three by the order of the time derivative.
+        """
+        extrapolation = self._extrapolation
+        return np.stack([self.course(time, order, extrapolate=extrapolation) for order in range(3)])
 
     @property
-    def _beyond(self) -> str | None:
-        """How a course continues after the last row."""
+    def _extrapolation(self) -> str | None:
+        """How a course continues after the last row, as scipy's ``extrapolate``."""
         return "periodic" if self.repeats else None
 
     @cached_property
     def uncertain_offset(self) -> float:
-        """Largest error of the offset by lines that do not end after whole periods, m/s²."""
+        """Largest error of the offset due to lines that do not end after whole periods, m/s²."""
         if self.repeats:
             return 0.0
-        lines = np.array(self._lines)
-        return float(np.sum(self._spectrum[lines] * leakage(np.maximum(lines, 2.0))))
+        periods = np.array(self._line_periods)
+        return float(np.sum(self._spectrum[periods] * leakage(np.maximum(periods, 2.0))))
 
     @cached_property
     def change_of_offset(self) -> float:
-        """Change of the offset from the first to the second half, m/s²; zero if lines could cause it."""
+        """Change of the offset from the first half to the second, m/s²; 0 if lines may cause it."""
         if self.repeats:
             return 0.0
-        half = len(self._even) // 2
-        change = float(np.linalg.norm(hann_mean(self._even[-half:]) - hann_mean(self._even[:half])))
-        lines = np.array(self._lines)
-        possible = 2.0 * np.sum(self._spectrum[lines] * leakage(np.maximum(lines / 2.0, 1.5)))
+        half = len(self._even_samples) // 2
+        first = hann_mean(self._even_samples[:half])
+        second = hann_mean(self._even_samples[-half:])
+        change = float(np.linalg.norm(second - first))
+        periods = np.array(self._line_periods)
+        leakages = leakage(np.maximum(periods / 2.0, 1.5))
+        possible = 2.0 * np.sum(self._spectrum[periods] * leakages)
         return change if change > possible else 0.0
 
     @property
     def doubts(self) -> list[str]:
-        """Reasons why the offset of the sensor may act as a tilt."""
-        reasons = []
-        if (error := self.uncertain_offset) > _TILT:
-            periods = f"{self._lines[0]} periods of its slowest line"
-            reasons.append(
+        """Reasons why the offset of the sensor may act as a tilt, in words."""
+        doubts = []
+        error = self.uncertain_offset
+        if error > _TILT:
+            periods = f"{self._line_periods[0]} periods of its slowest line"
+            doubts.append(
                 f"drive.record has only {periods}: its offset is uncertain by {_as_tilt(error)}"
             )
-        if (change := self.change_of_offset) > 2.0 * _TILT:
+        change = self.change_of_offset
+        if change > 2.0 * _TILT:
             halves = "the offset of drive.record changes from its first to its second half"
-            reasons.append(
-                f"{halves}: the rest acts as {_as_tilt(change / 2.0)}, first one way, then the other"
-            )
-        return reasons
+            tilt = _as_tilt(change / 2.0)
+            doubts.append(f"{halves}: the rest acts as {tilt}, first one way, then the other")
+        return doubts
 
     @property
     def notes(self) -> list[str]:
-        """What a user should know of a record before it is run."""
-        lines = []
+        """What a user should know of a record before it is run, in words."""
+        notes = []
         if self.ignored_columns:
+            columns = "columns that are no acceleration along x, y or z"
             names = ", ".join(f'"{name}"' for name in self.ignored_columns)
-            lines.append(
-                f"drive.record: columns that are no acceleration along x, y or z are left out: {names}"
-            )
-        if lost := int(np.sum(_gaps(np.array(self.rows)[:, 0]))):
-            lines.append(
-                f"drive.record lacks {counted(lost, 'row')}: the spline goes over the gaps"
-            )
-        amplitude, (smallest, largest) = self.largest(0), _DISPLACEMENTS
-        if not smallest < amplitude < largest:
-            size = f"{self.frequencies[0]:.4g} Hz and an amplitude of {amplitude:.2g} m"
-            lines.append(f"drive.record has {size}: is the unit of the time right?")
-        return [*lines, *self.doubts]
+            notes.append(f"drive.record: {columns} are left out: {names}")
+        lost = int(np.sum(_are_gaps(np.array(self.rows)[:, 0])))
+        if lost:
+            rows = counted(lost, "row")
+            notes.append(f"drive.record lacks {rows}: the spline goes over the gaps")
+        amplitude = self.largest(0)
+        if not _SMALLEST_DISPLACEMENT < amplitude < _LARGEST_DISPLACEMENT:
+            frequency = f"{self.frequencies[0]:.4g} Hz"
+            size = f"{frequency} and an amplitude of {amplitude:.2g} m"
+            notes.append(f"drive.record has {size}: is the unit of the time right?")
+        return [*notes, *self.doubts]
 
 
 def course_text(times: FloatArray, powers: FloatArray, repeats: bool = False) -> str:
-    """A course as the engine reads it: a period or 0, then each piece's time and powers, given the highest first."""
-    powers = powers[::-1].tolist() + [[0.0] * powers.shape[1]] * (6 - len(powers))
-    rows = zip(times.tolist(), *powers, strict=False)
-    return (
-        "\n".join([repr(float(times[-1] * repeats)), *(" ".join(map(repr, row)) for row in rows)])
-        + "\n"
-    )
+    """A piecewise polynomial of time as the engine reads it.
+
+    Parameters
+    ----------
+    times : ndarray, shape (N + 1,)
+        Start of each piece, and the end of the last one, s.
+    powers : ndarray, shape (K, N)
+        Coefficients of each piece, that of the highest power first, K up to 6.
+    repeats
+        Whether the course repeats from its end on.
+
+    Returns
+    -------
+    str
+        The period, s, or 0, on the first line; then a line for each piece with its start and six
+        coefficients, the constant first.
+    """
+    period = float(times[-1]) if repeats else 0.0
+    lines = [repr(period)]
+    missing_powers = [0.0] * (_POWERS_IN_TEXT - len(powers))
+    pieces = powers[::-1].T.tolist()
+    for start, coefficients in zip(times[:-1].tolist(), pieces, strict=True):
+        numbers = [start, *coefficients, *missing_powers]
+        lines.append(" ".join(map(repr, numbers)))
+    return "\n".join(lines) + "\n"
 
 
 def _as_tilt(acceleration: float) -> str:
@@ -338,20 +446,23 @@ def _as_tilt(acceleration: float) -> str:
     return f"{share:.2g} g, like a tilt of {tilt:.2g}°"
 
 
-def _through(rows: FloatArray, repeats: bool = False) -> PPoly:
-    """The spline of the acceleration through rows, shape (N, 4)."""
+def _spline(rows: FloatArray, *, repeats: bool = False) -> PPoly:
+    """The spline of the acceleration through rows, shape (N, 4).
+
+    The last row of a record that repeats is replaced by the first.
+    """
     from scipy.interpolate import CubicSpline
 
+    ends = "not-a-knot"
     if repeats:
+        ends = "periodic"
         rows[-1, 1:] = rows[0, 1:]
-    return CubicSpline(
-        rows[:, 0] - rows[0, 0], rows[:, 1:], bc_type="periodic" if repeats else "not-a-knot"
-    )
+    return CubicSpline(rows[:, 0] - rows[0, 0], rows[:, 1:], bc_type=ends)
 
 
-def _without_offset(rows: FloatArray, repeats: bool = False) -> PPoly:
-    """The acceleration through rows, shape (N, 4), without its offset."""
-    spline = _through(rows, repeats)
+def _without_offset(rows: FloatArray, *, repeats: bool = False) -> PPoly:
+    """The spline of the acceleration through rows, shape (N, 4), without its offset."""
+    spline = _spline(rows, repeats=repeats)
     length = spline.x[-1]
     if repeats:
         offset = spline.integrate(0.0, length) / length
@@ -362,79 +473,114 @@ def _without_offset(rows: FloatArray, repeats: bool = False) -> PPoly:
 
 
 def record_of(value: object) -> object:
-    """A record from its file's name and its rows, which stand in the place of the name in a case."""
+    """A record from the value of its key in a case.
+
+    Parameters
+    ----------
+    value
+        The name of its file (``file``), its ``rows`` and ``ignored_columns``, which stand in the
+        place of the name in a case; or a record, which is returned.
+
+    Raises
+    ------
+    ValueError
+        If the value is something else, or the rows give no motion that can be run.
+    """
     if isinstance(value, Record):
         return value
+    expected = "expected text: a file of comma-separated values"
+    if not isinstance(value, Mapping):
+        raise ValueError(expected)
     try:
-        rows = tuple((float(time), float(x), float(y), float(z)) for time, x, y, z in value["rows"])  # type: ignore[index]
+        rows = tuple(_row_of(row) for row in value["rows"])
     except (LookupError, TypeError, ValueError) as error:
-        raise ValueError("expected text: a file of comma-separated values") from error
+        raise ValueError(expected) from error
     _check(rows)
-    ignored = tuple(map(str, value.get("ignored_columns", ())))  # type: ignore[attr-defined]
-    return Record(file=value.get("file", ""), rows=rows, ignored_columns=ignored)  # type: ignore[attr-defined]
+    ignored_columns = tuple(map(str, value.get("ignored_columns", ())))
+    return Record(file=value.get("file", ""), rows=rows, ignored_columns=ignored_columns)
 
 
-def _gaps(time: FloatArray) -> FloatArray:
-    """Where single rows are lost, shape (N - 1,)."""
+def _row_of(row: Sequence[Any]) -> tuple[float, float, float, float]:
+    """A row as numbers: time, s, and acceleration along x, y and z, m/s²."""
+    time, x, y, z = row
+    return (float(time), float(x), float(y), float(z))
+
+
+def _are_gaps(time: FloatArray) -> BoolArray:
+    """Whether a row is lost between any two, shape (N - 1,)."""
     steps = np.diff(time)
-    return np.asarray(steps > _UNEVEN * np.median(steps))
+    return np.asarray(steps > _UNEVEN_STEP * np.median(steps))
 
 
 def _check(rows: Sequence[Sequence[float]]) -> None:
-    """Raise `ValueError` for rows that give no motion."""
-    if not FEWEST <= len(rows) <= MOST:
-        raise ValueError(f"has {len(rows)} rows; expected {FEWEST} to {MOST}")
-    array, largest = np.array(rows), ACCELERATION.largest
-    if (
-        odd := ~np.isfinite(array).all(axis=1) | (np.abs(array[:, 1:]) > largest).any(axis=1)
-    ).any():
-        expected = f"expected a number in each column, accelerations up to {largest:g} m/s²"
-        raise ValueError(f"row {np.argmax(odd) + 1}: {expected}")
+    """Raise `ValueError` for rows that give no motion that can be run."""
+    if not FEWEST_ROWS <= len(rows) <= MOST_ROWS:
+        raise ValueError(f"has {len(rows)} rows; expected {FEWEST_ROWS} to {MOST_ROWS}")
+    array = np.array(rows)
+    _check_numbers(array)
     _check_times(array[:, 0])
-    spread = np.ptp(array[:, 1:], axis=0)
-    if (spread <= _CONSTANT * np.abs(array[:, 1:]).max(axis=0)).all():
+    _check_change(array[:, 1:])
+    _check_resolution(array)
+
+
+def _check_numbers(rows: FloatArray) -> None:
+    """Raise `ValueError` for rows, shape (N, 4), with numbers that are not finite or too large."""
+    largest = ACCELERATION.largest
+    not_finite = ~np.isfinite(rows).all(axis=1)
+    too_large = (np.abs(rows[:, 1:]) > largest).any(axis=1)
+    unusable = not_finite | too_large
+    if unusable.any():
+        expected = f"expected a number in each column, accelerations up to {largest:g} m/s²"
+        raise ValueError(f"row {np.argmax(unusable) + 1}: {expected}")
+
+
+def _check_change(acceleration: FloatArray) -> None:
+    """Raise `ValueError` for an acceleration, m/s², shape (N, 3), that hardly changes."""
+    change = np.ptp(acceleration, axis=0)
+    if (change <= _CONSTANT_SHARE * np.abs(acceleration).max(axis=0)).all():
         raise ValueError(
             "the acceleration is constant, as from a dead sensor; expected one that changes"
         )
-    if spread.max() < 2.0 * ACCELERATION.smallest:
-        amplitude = f"{spread.max() / 2.0:.2g} m/s²"
-        raise ValueError(
-            f"expected an acceleration of {ACCELERATION.smallest:g} m/s² or more, found {amplitude}"
-        )
-    time = array[:, 0] - array[0, 0]
-    from_half = _through(array[::2])(time)
-    difference = (array[:, 1:] - from_half)[:-1]  # half of the rows may end before the last one
-    change = float(np.linalg.norm(difference) / np.linalg.norm(_without_offset(array)(time)))
-    if change > _COARSE:
-        message = "rows are too far apart, or too noisy: leaving out every second one changes the acceleration by"
-        raise ValueError(
-            f"{message} {change:.0%} (root mean square); expected at most {_COARSE:.0%}"
-        )
+    if change.max() < 2.0 * ACCELERATION.smallest:
+        expected = f"expected an acceleration of {ACCELERATION.smallest:g} m/s² or more"
+        raise ValueError(f"{expected}, found {change.max() / 2.0:.2g} m/s²")
+
+
+def _check_resolution(rows: FloatArray) -> None:
+    """Raise `ValueError` for rows, shape (N, 4), that are too far apart for their acceleration."""
+    time = rows[:, 0] - rows[0, 0]
+    from_half = _spline(rows[::2])(time)
+    difference = (rows[:, 1:] - from_half)[:-1]  # half of the rows may end before the last one
+    size = np.linalg.norm(_without_offset(rows)(time))
+    change = float(np.linalg.norm(difference) / size)
+    if change > _LARGEST_COARSENESS:
+        cause = "rows are too far apart, or too noisy"
+        found = f"leaving out every second one changes the acceleration by {change:.0%}"
+        expected = f"expected at most {_LARGEST_COARSENESS:.0%}"
+        raise ValueError(f"{cause}: {found} (root mean square); {expected}")
 
 
 def _check_times(time: FloatArray) -> None:
-    """Raise `ValueError` for times (s) that do not increase evenly."""
+    """Raise `ValueError` for times, s, shape (N,), that do not increase evenly."""
     steps = np.diff(time)
     if (steps < 0.0).all():
         raise ValueError(
             "times decrease from row to row; expected the first measurement in the first row"
         )
     repeated = steps == 0.0
-    if repeated.mean() > _REPEATED and (steps >= 0.0).all():
-        first = int(np.argmax(repeated)) + 1
-        coarse = (
-            f"times repeat: rows {first} and {first + 1} are both at {1e3 * time[first]:.6g} ms"
-        )
-        raise ValueError(f"{coarse}; expected times with more digits, such as whole microseconds")
-    usual = np.median(steps)
-    lost = (steps > _UNEVEN * usual) & (steps <= _LOST * usual)
-    odd = (steps <= 0.0) | (steps > _UNEVEN * usual)
-    if lost.sum() <= _MOST_LOST * len(time):
-        odd &= ~lost
-    if odd.any():
-        after = (
-            f"row {np.argmax(odd) + 2} is {1e3 * steps[np.argmax(odd)]:.6g} ms after the one before"
-        )
-        raise ValueError(
-            f"{after}; expected times that increase without gaps, about {1e3 * usual:.6g} ms apart"
-        )
+    if repeated.mean() > _LARGEST_REPEATED_SHARE and (steps >= 0.0).all():
+        row = int(np.argmax(repeated)) + 1
+        same_time = f"{1e3 * time[row]:.6g} ms"
+        found = f"times repeat: rows {row} and {row + 1} are both at {same_time}"
+        raise ValueError(f"{found}; expected times with more digits, such as whole microseconds")
+    usual_step = np.median(steps)
+    too_long = steps > _UNEVEN_STEP * usual_step
+    lost = too_long & (steps <= _LOST_STEP * usual_step)
+    uneven = (steps <= 0.0) | too_long
+    if lost.sum() <= _LARGEST_LOST_SHARE * len(time):
+        uneven &= ~lost
+    if uneven.any():
+        first = np.argmax(uneven)
+        found = f"row {first + 2} is {1e3 * steps[first]:.6g} ms after the one before"
+        expected = "expected times that increase without gaps"
+        raise ValueError(f"{found}; {expected}, about {1e3 * usual_step:.6g} ms apart")
