@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from typing import TypedDict
 
@@ -18,28 +18,40 @@ from walkers.files import read_limited
 from walkers.inputs.units import ACCELERATION, TIME, QuantityKind, parse_quantity
 
 _MOST_BYTES = 64 << 20
+"""Largest size of a file."""
 _EXAMPLE = '"time (ms), x (g), z (m/s^2)"'
 _EXPECTED_HEADER = (
     f"expected a header that names the time and accelerations along x, y or z, such as {_EXAMPLE}"
 )
-_QUOTED = 60  # longest quotation of a line of the file, in letters
+_LONGEST_QUOTATION = 60
+"""Longest quotation of a line of the file in a message, in letters."""
 _NAME_AND_UNIT = re.compile(r"(?P<name>[^\[\]()]*)[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
+"""A name in the header with its unit in brackets."""
 _TIME_NAMES = frozenset({"t", "time", "timestamp"})
+"""Names of the column of the time."""
 _AXIS_NAME = re.compile(
-    r"(linear )?(a|acc|accel|acceleration)? ?(?P<axis>[xyz])"  # such as "acc x", "ax", "x"
+    r"(linear )?(a|acc|accel|acceleration)? ?(?P<axis>[xyz])"
     r"|(?P<first>[xyz]) (acc|acceleration)"
 )
+"""Names of columns of accelerations, such as "acc x", "ax", "x" or "x acc"."""
+_QUANTITIES = ("time", "acceleration along x", "acceleration along y", "acceleration along z")
+"""Quantities of a row of a record, in their order."""
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
 _METRE_PER_SECOND_SQUARED = frozenset(
     ("m/s2", "m/s^2", "m/s²", "m/s**2", "m/s/s", "m s-2", "m s^-2", "m·s⁻²", "ms^-2")
 )
+"""How loggers write m/s²."""
 
 
 class RecordContents(TypedDict):
     """What a file of recorded shaking contains.
 
-    ``rows`` have the time, s, and the acceleration along x, y and z, m/s². ``ignored_columns`` are
-    the names of the other columns.
+    Attributes
+    ----------
+    rows
+        Time, s, and acceleration along x, y and z, m/s².
+    ignored_columns
+        Names of the columns that are neither.
     """
 
     rows: list[list[float]]
@@ -50,8 +62,16 @@ class RecordContents(TypedDict):
 class _Column:
     """A column that is read.
 
-    ``number`` is its place in a row of the file, ``place`` its place in a row of the record,
-    ``factor`` its unit in SI units, ``head`` its name and unit in the header.
+    Attributes
+    ----------
+    number
+        Its place in a row of the file.
+    place
+        Its place in a row of the record: 0 for the time, 1 to 3 for x, y and z.
+    factor
+        Its unit in SI units.
+    head
+        Its name and unit in the header.
     """
 
     number: int
@@ -92,13 +112,14 @@ def read_record(path: Path) -> RecordContents:
     except csv.Error as error:
         raise ValueError(f"expected rows of numbers below a header: {error}") from error
     heads = _without_empty_end(header)
-    columns, ignored = _columns_of(heads, lines[0])
-    numbers = [
-        _row_of(row, number, heads, columns, separator) for number, row in enumerate(rows, 1)
-    ]
-    if any("," in row[column.number] for row in rows for column in columns):
-        _check_decimal_commas(rows, columns)
-    return {"rows": numbers, "ignored_columns": ignored}
+    columns, ignored_columns = _columns_of(heads)
+    _check_columns(columns, lines[0])
+    rows_of_record = []
+    for number, fields in enumerate(rows, 1):
+        _check_length(fields, number, heads, separator)
+        rows_of_record.append(_row_of(fields, number, columns))
+    _check_decimal_commas(rows, columns)
+    return {"rows": rows_of_record, "ignored_columns": ignored_columns}
 
 
 def _text_of(path: Path) -> str:
@@ -150,41 +171,49 @@ def _is_of_numbers(line: str) -> bool:
 
 
 def _without_empty_end(fields: Sequence[str]) -> list[str]:
-    """The fields of a line up to the last one that is not empty: loggers end lines with a separator."""
-    kept = list(fields)
-    while kept and not kept[-1].strip():
-        kept.pop()
-    return kept
+    """The fields of a line without empty ones at its end: loggers end lines with a separator."""
+    number = len(fields)
+    while number and not fields[number - 1].strip():
+        number -= 1
+    return list(fields[:number])
 
 
-def _columns_of(heads: Sequence[str], line: str) -> tuple[list[_Column], list[str]]:
+def _columns_of(heads: Sequence[str]) -> tuple[list[_Column], list[str]]:
     """The columns of the time and of accelerations, and the names of the others."""
     columns: list[_Column] = []
     ignored: list[str] = []
-    for number, head in enumerate(heads):
-        match = _NAME_AND_UNIT.fullmatch(head.strip())
-        name, unit = (match["name"], match["unit"].strip()) if match else (head, "")
+    for number, field in enumerate(heads):
+        head = field.strip()
+        match = _NAME_AND_UNIT.fullmatch(head)
+        name = match["name"] if match else head
+        unit = match["unit"].strip() if match else ""
         place = _place_of(name)
         if place is None:
-            ignored.append(head.strip() or f"number {number + 1}")
+            ignored.append(head or f"number {number + 1}")
             continue
-        kind = TIME if place == 0 else ACCELERATION
-        columns.append(_Column(number, place, _factor_of(head.strip(), unit, kind), head.strip()))
-    for place, quantity in enumerate(("time", *(f"acceleration along {axis}" for axis in "xyz"))):
-        same = [f'"{column.head}"' for column in columns if column.place == place]
-        if len(same) > 1:
-            raise ValueError(
-                f"columns {' and '.join(same)} are both the {quantity}; expected one of them"
-            )
+        factor = _factor_of(head, unit, TIME if place == 0 else ACCELERATION)
+        columns.append(_Column(number=number, place=place, factor=factor, head=head))
+    return columns, ignored
+
+
+def _check_columns(columns: Sequence[_Column], header: str) -> None:
+    """Raise `ValueError` unless there is one time, one acceleration or more, and each once."""
+    for place, quantity in enumerate(_QUANTITIES):
+        heads = [f'"{column.head}"' for column in columns if column.place == place]
+        if len(heads) > 1:
+            both = " and ".join(heads)
+            raise ValueError(f"columns {both} are both the {quantity}; expected one of them")
     places = {column.place for column in columns}
-    if 0 not in places or len(places) < 2:
-        quotation = line.strip() if len(line.strip()) <= _QUOTED else f"{line.strip()[:_QUOTED]}..."
-        missing = "names no acceleration along x, y or z" if 0 in places else "names no time"
-        if places:
-            raise ValueError(f'{_EXPECTED_HEADER}; "{quotation}" {missing}')
+    if 0 in places and len(places) > 1:
+        return
+    quotation = header.strip()
+    if len(quotation) > _LONGEST_QUOTATION:
+        quotation = f"{quotation[:_LONGEST_QUOTATION]}..."
+    if not places:
         cure = "replace all lines above the numbers by a header"
         raise ValueError(f'{_EXPECTED_HEADER}, found "{quotation}": {cure}')
-    return columns, ignored
+    missing = "names no acceleration along x, y or z" if 0 in places else "names no time"
+    raise ValueError(f'{_EXPECTED_HEADER}; "{quotation}" {missing}')
 
 
 def _place_of(name: str) -> int | None:
@@ -213,43 +242,51 @@ def _factor_of(head: str, unit: str, kind: QuantityKind) -> float:
         raise ValueError(f'column "{head}": {error}, in brackets behind the name') from error
 
 
-def _row_of(
-    fields: Sequence[str],
-    number: int,
-    heads: Sequence[str],
-    columns: Sequence[_Column],
-    separator: str,
-) -> list[float]:
-    """A row of the record."""
-    if len(_without_empty_end(fields)) > len(heads):
-        counts = f"row {number} has {len(_without_empty_end(fields))} values, the header {len(heads)} names"
-        if separator == ",":
-            raise ValueError(f"{counts}: decimal commas? Then separate the columns by semicolons")
-        raise ValueError(f"{counts}; expected a name for each column")
+def _check_length(fields: Sequence[str], number: int, heads: Sequence[str], separator: str) -> None:
+    """Raise `ValueError` for a row of the file with more values than the header has names."""
+    values = len(_without_empty_end(fields))
+    if values <= len(heads):
+        return
+    found = f"row {number} has {values} values, the header {len(heads)} names"
+    if separator == ",":
+        raise ValueError(f"{found}: decimal commas? Then separate the columns by semicolons")
+    raise ValueError(f"{found}; expected a name for each column")
+
+
+def _row_of(fields: Sequence[str], number: int, columns: Sequence[_Column]) -> list[float]:
+    """A row of the record, of the row of the file with a number."""
     row = [0.0, 0.0, 0.0, 0.0]
     for column in columns:
         text = fields[column.number].strip() if column.number < len(fields) else ""
-        plain = text.replace(",", ".") if text.count(",") == 1 and "." not in text else text
-        value = float(plain) if _NUMBER.fullmatch(plain) else float("nan")
+        value = _number_of(text)
         if not isfinite(value):
-            raise ValueError(
-                f'row {number}: column "{column.head}" is "{text[:_QUOTED]}"; expected a number'
-            )
+            found = f'row {number}: column "{column.head}" is "{text[:_LONGEST_QUOTATION]}"'
+            raise ValueError(f"{found}; expected a number")
         row[column.place] = value * column.factor
     return row
 
 
-def _texts(rows: Sequence[Sequence[str]], columns: Sequence[_Column]) -> Iterator[str]:
-    """The numbers of a file as it writes them."""
-    for row in rows:
-        for column in columns:
-            yield row[column.number]
+def _number_of(text: str) -> float:
+    """The number of a text, which may have a decimal comma; NaN if it is none."""
+    if text.count(",") == 1 and "." not in text:
+        text = text.replace(",", ".")
+    return float(text) if _NUMBER.fullmatch(text) else nan
 
 
 def _check_decimal_commas(rows: Sequence[Sequence[str]], columns: Sequence[_Column]) -> None:
     """Refuse a file whose numbers have commas and points: the commas may separate thousands."""
-    with_comma = next(text for text in _texts(rows, columns) if "," in text)
-    with_point = next((text for text in _texts(rows, columns) if "." in text), None)
-    if with_point is not None:
-        both = f'numbers with a comma, "{with_comma.strip()}", and with a point, "{with_point.strip()}"'
-        raise ValueError(f"has {both}; expected either decimal commas or decimal points")
+    with_comma = ""
+    with_point = ""
+    for row in rows:
+        for column in columns:
+            text = row[column.number]
+            if not with_comma and "," in text:
+                with_comma = text.strip()
+            if not with_point and "." in text:
+                with_point = text.strip()
+    if with_comma and with_point:
+        comma = f'numbers with a comma, "{with_comma}"'
+        point = f'with a point, "{with_point}"'
+        raise ValueError(
+            f"has {comma}, and {point}; expected either decimal commas or decimal points"
+        )
