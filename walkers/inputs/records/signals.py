@@ -23,18 +23,29 @@ Samples = TypeVar("Samples", FloatArray, ComplexArray)
 
 
 def hann(points: int) -> FloatArray:
-    """Weights of a Hann window with a sum of one, shape (points,); the zeros at its ends are left out."""
+    """Weights of a Hann window, shape (points,), with a sum of one and no zeros at its ends."""
     weights = np.sin(pi * np.arange(1, points + 1) / (points + 1)) ** 2
     return np.asarray(weights / weights.sum())
 
 
 def leakage(periods: FloatArray) -> FloatArray:
-    """Largest share of a sine's amplitude in the Hann-weighted mean over a number of its periods, from two on."""
+    """Largest share of the amplitude of a sine in its Hann-weighted mean.
+
+    Parameters
+    ----------
+    periods : ndarray
+        Number of periods of the sine over which the mean is taken, from two on.
+
+    Returns
+    -------
+    ndarray
+        A share for each number.
+    """
     return np.asarray(1.0 / (pi * periods * (periods**2 - 1.0)))
 
 
 def hann_mean(samples: FloatArray) -> FloatArray:
-    """Hann-weighted mean of all samples, shape (K,)."""
+    """Hann-weighted mean of samples, shape (N, K), over time: shape (K,)."""
     return np.asarray(hann(len(samples)) @ samples)
 
 
@@ -57,8 +68,8 @@ def slow_part(samples: FloatArray, width: int) -> FloatArray:
     Returns
     -------
     ndarray, shape (N, K)
-        It contains nothing of motions of two periods or more in a window, three quarters of a
-        motion of one period, and slower motions as a whole.
+        It contains nothing of a motion with two or more periods in a window, three quarters of a
+        motion with one period, and slower motions entirely.
     """
     first = _smoothed(samples, width)
     return first + _smoothed(samples - first, width)
@@ -79,9 +90,10 @@ def _smoothed(samples: FloatArray, width: int) -> FloatArray:
 
 
 def _centred_window(samples: FloatArray, width: int) -> FloatArray:
-    """Weights of a window with a sample in its middle: of an odd number of samples."""
+    """Weights of the widest Hann window of an odd number of samples, one of them in its middle."""
     longest_window = min(width, len(samples))
-    return hann(longest_window - (longest_window + 1) % 2)
+    is_even = longest_window % 2 == 0
+    return hann(longest_window - 1 if is_even else longest_window)
 
 
 def local_amplitude(samples: FloatArray, frequency: float, width: int) -> FloatArray:
@@ -119,25 +131,40 @@ def periods_by_phase(samples: FloatArray, periods: float) -> float:
     samples : ndarray, shape (N, K)
         Evenly spaced components of one vector.
     periods
-        The number within one.
+        An estimate that is off by less than one.
+
+    Returns
+    -------
+    float
+        The number, which need not be whole.
     """
     half = len(samples) // 2
     weights = hann(half)
-    apart = len(samples) - half
+    start_of_second = len(samples) - half
+    number = np.arange(len(samples))
     for _ in range(2):
-        turned = (
-            samples * np.exp(-2j * pi * periods / len(samples) * np.arange(len(samples)))[:, None]
-        )
+        turned = samples * np.exp(-2j * pi * periods / len(samples) * number)[:, None]
         first = weights @ turned[:half]
-        second = weights @ turned[apart:]
-        periods += float(np.angle(np.vdot(first, second))) / (2.0 * pi) * len(samples) / apart
+        second = weights @ turned[start_of_second:]
+        turn = float(np.angle(np.vdot(first, second)))
+        periods += turn / (2.0 * pi) * len(samples) / start_of_second
     return periods
 
 
 def longest(phasor: ComplexArray) -> FloatArray:
-    """Largest length of vectors Re(phasor exp(iωt)) in a cycle, of phasors of shape (N, K).
+    """Largest length of vectors Re(phasor exp(iωt)) in a cycle.
 
-    A vector describes an ellipse, and is longest along its semi-major axis.
+    Such a vector describes an ellipse, and is longest along its semi-major axis.
+
+    Parameters
+    ----------
+    phasor : ndarray, shape (N, K)
+        Complex components of each vector.
+
+    Returns
+    -------
+    ndarray, shape (N,)
+        In the unit of the phasors.
     """
     squares = np.sum(np.abs(phasor) ** 2, axis=1)
     return np.asarray(np.sqrt((squares + np.abs(np.sum(phasor**2, axis=1))) / 2.0))
