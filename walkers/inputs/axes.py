@@ -134,15 +134,19 @@ def _spaced(key: str, axis: object, spacing: str, given: object) -> list[Value]:
         example = f'{{ {spacing} = ["0.5 g", "10 g", 20] }}'
         message = f"expected first value, last value and number, such as {example}"
         raise key_error(key, message, axis)
-    *ends, number = given
+    first_value, last_value, number = given
+    are_whole = type(first_value) is int and type(last_value) is int
     geometric = spacing == "geomspace"
-    (first, last), unit = _numbers(key, ends, positive=geometric)
+    (first, last), unit = _numbers(key, [first_value, last_value], positive=geometric)
     spaced = np.geomspace if geometric else np.linspace
-    values = [value_in_unit(float(value), unit) for value in spaced(first, last, number)]
-    if not all(type(end) is int for end in ends):
-        return values
-    # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
-    return [int(value) if value.is_integer() else value for value in values]
+    values = []
+    for spaced_number in spaced(first, last, number):
+        value = value_in_unit(float(spaced_number), unit)
+        # Between whole numbers whole ones stay whole: seeds, cycles, replicates.
+        if are_whole and value.is_integer():
+            value = int(value)
+        values.append(value)
+    return values
 
 
 def _are_ends_and_number(given: object) -> TypeGuard[list[Any]]:
@@ -177,7 +181,9 @@ def without_unit(value: Value) -> Any:
     if not isinstance(value, str):
         return value
     quantity = as_quantity(value)
-    return value if quantity is None else quantity[0]
+    if quantity is None:
+        return value
+    return quantity[0]
 
 
 def value_in_unit(number: float, unit: str | None) -> Value:
@@ -186,7 +192,9 @@ def value_in_unit(number: float, unit: str | None) -> Value:
     It is rounded to twelve digits, so that 0.1 + 0.2 gives 0.3.
     """
     rounded = float(f"{number:.12g}")
-    return rounded if unit is None else f"{rounded!r} {unit}"
+    if unit is None:
+        return rounded
+    return f"{rounded!r} {unit}"
 
 
 def unit_of(key: str, values: Sequence[Value]) -> str | None:

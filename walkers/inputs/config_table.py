@@ -169,7 +169,10 @@ class ConfigTable(BaseModel):
         index = int(rest[0])
         inner = rest[1:]
         entries = list(below)
-        entries[index] = entries[index].with_value_at(joined(inner), value) if inner else value
+        if inner:
+            entries[index] = entries[index].with_value_at(joined(inner), value)
+        else:
+            entries[index] = value
         return self.with_values(**{field: tuple(entries)})
 
     def completed(self, model: type[Completed], values: Mapping[str, Any]) -> Completed:
@@ -195,11 +198,13 @@ class ConfigTable(BaseModel):
         value: Any = self
         for part in parts_of(name):
             if isinstance(part, int):
-                has_entry = isinstance(value, tuple) and part < len(value)
-                value = value[part] if has_entry else None
+                if not isinstance(value, tuple) or part >= len(value):
+                    return None
+                value = value[part]
             else:
-                has_key = isinstance(value, ConfigTable) and part in type(value).model_fields
-                value = getattr(value, part) if has_key else None
+                if not isinstance(value, ConfigTable) or part not in type(value).model_fields:
+                    return None
+                value = getattr(value, part)
         return value
 
     def leaves(self, prefix: str = "") -> Iterator[tuple[str, Any, FieldInfo]]:
@@ -232,7 +237,7 @@ class ConfigTable(BaseModel):
         Absent values are left out. A new key therefore renames no runs, while another name of a
         field, or another default, renames all of them.
         """
-        determinants = {}
+        determinants: dict[str, Any] = {}
         for name, field in type(self).model_fields.items():
             value = getattr(self, name)
             if SAME_RUN in field.metadata or value in (None, ()):
@@ -281,12 +286,12 @@ class ConfigTable(BaseModel):
             yield Problem(key_within(place, at_fault), None, message)
         elif begun or choice.required:
             expected = begun[0] if begun else choice.expressions[0]
-            substitutes = []
+            instead = ""
             if not begun:
-                substitutes += [" and ".join(names) for names in choice.expressions[1:]]
+                for names in choice.expressions[1:]:
+                    instead += f", or {' and '.join(names)}"
             if choice.instead:
-                substitutes.append(choice.instead)
-            instead = "".join(f", or {words}" for words in substitutes)
+                instead += f", or {choice.instead}"
             for name in expected:
                 if name not in given:
                     yield cls.missing(name, place, instead)
@@ -364,6 +369,11 @@ def table_in(annotation: Any) -> type[ConfigTable] | None:
     return None
 
 
+def table_of(field: FieldInfo | None) -> type[ConfigTable] | None:
+    """The class of the tables that a field contains; None for another field, and for no field."""
+    return table_in(field.annotation) if field else None
+
+
 def example_of(field: FieldInfo) -> str:
     """An example of a value, as in ``a value such as "80 Hz"``, or its type if there is none."""
     if field.examples:
@@ -392,8 +402,7 @@ def contradictions(model: type[ConfigTable], document: Any, place: str = "") -> 
     given = {name: value for name, value in document.items() if value != []}
     yield from model.problems(given, place)
     for name, value in document.items():
-        field = table_keys(model).get(name)
-        table = table_in(field.annotation) if field else None
+        table = table_of(table_keys(model).get(name))
         if table is None:
             continue
         inner_place = key_within(place, name)
@@ -410,8 +419,7 @@ def alternatives(model: type[ConfigTable], name: str) -> set[str]:
     table: type[ConfigTable] | None = model
     if path:
         names_in_path = [part for part in path if isinstance(part, str)]
-        field = dotted_keys(model).get(".".join(names_in_path))
-        table = table_in(field.annotation) if field else None
+        table = table_of(dotted_keys(model).get(".".join(names_in_path)))
     if table is None:
         return set()
     excluded = set()

@@ -107,8 +107,10 @@ def settings_of(words: Iterable[str]) -> dict[str, Value]:
     """
     settings: dict[str, Value] = {}
     for word in words:
-        key, separator, text = (part.strip() for part in word.partition("="))
-        if not (key and separator and text):
+        before, _, after = word.partition("=")
+        key = before.strip()
+        text = after.strip()
+        if not key or not text:
             problem = Problem(word, None, "expected key=value, such as drive.frequency=70Hz")
             raise InputError("--set", [problem])
         if key in settings:

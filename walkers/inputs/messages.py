@@ -21,11 +21,12 @@ from walkers.inputs.config_table import (
     ConfigTable,
     dotted_keys,
     example_of,
-    table_in,
     table_keys,
+    table_of,
 )
 from walkers.inputs.keys import MISSING, joined, parts_of, value_at
 from walkers.inputs.units import AUTO, WRITTEN
+from walkers.rounding import counted
 
 FileModel = TypeVar("FileModel", bound=BaseModel)
 
@@ -73,7 +74,12 @@ class _Place:
     @property
     def table(self) -> type[ConfigTable] | None:
         """The class of the tables at the place; None if its value is no table."""
-        return table_in(self.field.annotation) if self.field else None
+        return table_of(self.field)
+
+    @property
+    def meaning(self) -> str:
+        """What the key means; empty without a field."""
+        return str(self.field.description) if self.field else ""
 
     @property
     def example(self) -> str:
@@ -183,9 +189,10 @@ def _problem_of(
     error_type = details["type"]
     # Pydantic marks a name that the user gives, and that is wrong itself, by a part "[key]".
     location = tuple(part for part in details["loc"] if part != "[key]")
-    # A list that is too short lacks its next entry: the problem is one of the list.
+    parts = location
     lacks_entry = error_type == "missing" and isinstance(location[-1], int)
-    parts = location[:-1] if lacks_entry else location
+    if lacks_entry:
+        parts = location[:-1]  # the list is too short, rather than its entry wrong
     fields = dotted_keys(model)
     place = _Place(parts, fields.get(_general_key(parts, fields)))
     if error_type == "extra_forbidden":
@@ -207,9 +214,10 @@ def _problem_of(
 def _wrong_length(place: _Place, document: Mapping[str, Any], expected: str) -> str:
     """The message about a list with too few or too many values."""
     value = value_at(document, parts_of(place.key))
-    number = len(value) if isinstance(value, list) else 0
-    values = "1 value" if number == 1 else f"{number} values"
-    return f"has {values}; expected {expected}{place.such_as}"
+    number = 0
+    if isinstance(value, list):
+        number = len(value)
+    return f"has {counted(number, 'value')}; expected {expected}{place.such_as}"
 
 
 def _missing(place: _Place) -> str:
@@ -237,7 +245,7 @@ def _wrong_value(place: _Place, details: ErrorDetails) -> str:
         words = {
             "example": place.example,
             "such_as": place.such_as,
-            "meaning": place.field.description if place.field else "",
+            "meaning": place.meaning,
             "key": place.key,
         }
         message = _SENTENCES.get(error_type, "expected {example}").format(**(words | context))
@@ -258,7 +266,9 @@ def _general_key(location: Sequence[str | int], keys: Collection[str]) -> str:
     for part in location:
         if isinstance(part, str):
             below = f"{general}.{part}".lstrip(".")
-            general = below if below in keys else f"{general}.*"
+            if below not in keys:
+                below = f"{general}.*"
+            general = below
     return general
 
 
@@ -270,7 +280,7 @@ def check_key(model: type[ConfigTable], key: str) -> None:
     field = dotted_keys(model).get(".".join(parts))
     if field is None:
         raise key_error(key, _unknown_key(parts, model, "a case"))
-    if table_in(field.annotation):
+    if table_of(field):
         raise key_error(key, "is a table of a case; expected one of its keys")
 
 
@@ -294,7 +304,9 @@ def _unknown_key(names: Sequence[str], model: type[BaseModel], file_kind: str) -
     same_key_elsewhere = _same_key_elsewhere(name, fields)
     if not keys_of_table:
         return f"unknown key{suggestion('.'.join(names), fields) or same_key_elsewhere}"
-    table = f"[{'.'.join(tables)}]" if tables else file_kind
+    table = file_kind
+    if tables:
+        table = f"[{'.'.join(tables)}]"
     hint = suggestion(name, keys_of_table) or same_key_elsewhere
     return f"unknown key; {table} takes {', '.join(keys_of_table)}{hint}"
 
@@ -304,9 +316,10 @@ def _keys_of_table(tables: Sequence[str], model: type[BaseModel]) -> list[str]:
     if not tables:
         return list(table_keys(model))
     fields = dotted_keys(model)
-    field = fields.get(_general_key(tables, fields))
-    table = table_in(field.annotation) if field else None
-    return list(table_keys(table)) if table else []
+    table = table_of(fields.get(_general_key(tables, fields)))
+    if table is None:
+        return []
+    return list(table_keys(table))
 
 
 def _fields_by_suggested_key(model: type[BaseModel]) -> dict[str, FieldInfo]:
@@ -320,7 +333,7 @@ def _fields_by_suggested_key(model: type[BaseModel]) -> dict[str, FieldInfo]:
 def _same_key_elsewhere(name: str, fields: Mapping[str, FieldInfo]) -> str:
     """A suggestion of the first key of this name in another table; empty if there is none."""
     for key, field in fields.items():
-        is_plain = "*" not in key and not table_in(field.annotation)
+        is_plain = "*" not in key and not table_of(field)
         if is_plain and key.split(".")[-1] == name:
             return f'; did you mean "{key}"?'
     return ""

@@ -90,7 +90,9 @@ class Origin:
         """
         if self.origin == "default" and self.range is not None:
             return "guessed"
-        return f"{self.origin}, uncertain" if self.uncertain else self.origin
+        if self.uncertain:
+            return f"{self.origin}, uncertain"
+        return self.origin
 
 
 def text_of(value: Any, kind: QuantityKind | None = None) -> str:
@@ -107,7 +109,9 @@ def text_of(value: Any, kind: QuantityKind | None = None) -> str:
         texts = []
         for entry in value:
             text = text_of(entry, kind)
-            texts.append(f"({text})" if isinstance(entry, (list, tuple)) else text)
+            if isinstance(entry, (list, tuple)):
+                text = f"({text})"
+            texts.append(text)
         return ", ".join(texts)
     if isinstance(value, bool):
         return "true" if value else "false"

@@ -113,8 +113,10 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
         _check_added_tables(document)
         document = with_files(document, path.parent)
     if "library" not in document and path.name != FILE_NAME:
-        is_shipped = path.parent == _HERE / "cases"
-        library = read_library((folder or Path()) if is_shipped else path.parent)
+        library_folder = path.parent
+        if path.parent == _HERE / "cases":
+            library_folder = folder or Path()
+        library = read_library(library_folder)
         if library:
             document["library"] = library
     return document
@@ -122,10 +124,10 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
 
 def _check_added_tables(document: Mapping[str, Any]) -> None:
     """Refuse tables that the program makes of the files that a case names."""
+    added = ["records"]
     mesh = value_at(document, ("boundary", "mesh"))
-    # The case of an archive contains its mesh.
-    contains_mesh = value_at(document, ("meshes", mesh)) is not MISSING
-    added = ("records",) if contains_mesh else ("records", "meshes")
+    if value_at(document, ("meshes", mesh)) is MISSING:  # the case of an archive contains its mesh
+        added.append("meshes")
     for table in added:
         if table in document:
             message = "unknown key: the program reads this table from a file that the case names"
@@ -175,7 +177,9 @@ def find_input(name: str | Path, kind: str) -> Path:
             return path
     except OSError as error:
         raise input_error(shortened(text), f"cannot be read: {error.strerror}") from error
-    missing = "no such file, run or sweep" if kind == "case" else "no such file"
+    missing = "no such file"
+    if kind == "case":
+        missing = "no such file, run or sweep"
     names = ", ".join(shipped_files)
     hint = suggestion(text, shipped_files)
     raise input_error(name, f"{missing}, nor a shipped {kind} ({names}){hint}")

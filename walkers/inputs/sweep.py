@@ -153,7 +153,9 @@ class SweepDefinition:
         for number, row in enumerate(self.rows):
             changes = dict(zip(self.keys, row, strict=True))
             point = ", ".join(f"{key} = {value}" for key, value in changes.items())
-            source = f"{self.source}: point {number} ({point})" if point else self.source
+            source = self.source
+            if point:
+                source = f"{self.source}: point {number} ({point})"
             with attributed_to(source):
                 document = changed(CaseFile, self.document, changes)
             case = build_case(document, source=source, name=self.case_name)
@@ -283,6 +285,9 @@ def expand(
             changed(CaseFile, tables, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
         raise input_error(source, "has infinitely nested tables") from error
+    until_below = None
+    if file.descend:
+        until_below = file.descend.until_below
     return SweepDefinition(
         name=name,
         source=source,
@@ -292,7 +297,7 @@ def expand(
         document=tables,
         axes=axes,
         rows=rows,
-        until_below=file.descend.until_below if file.descend else None,
+        until_below=until_below,
     )
 
 

@@ -239,7 +239,9 @@ def as_quantity(value: Any) -> tuple[float, str | None] | None:
             number = float(value)
         except OverflowError:  # an integer of hundreds of digits
             return None
-    return (number, unit) if isfinite(number) else None
+    if not isfinite(number):
+        return None
+    return number, unit
 
 
 def quantity_text(value: float, kind: QuantityKind) -> str:

@@ -289,7 +289,7 @@ class Record(ConfigTable):
         periods = self.strongest_line * self.length
         width = AMPLITUDE_WINDOW_PERIODS / periods
         # Beats with another line come and go within a few cycles: the amplitude does not change.
-        fewest_beats = count
+        fewest_beats = float(count)
         for line_periods in self._line_periods:
             beats = abs(line_periods - periods)
             if beats >= _FEWEST_BEATS:
@@ -370,9 +370,11 @@ class Record(ConfigTable):
         second = hann_mean(self._even_samples[-half:])
         change = float(np.linalg.norm(second - first))
         periods = np.array(self._line_periods)
-        leakages = leakage(np.maximum(periods / 2.0, 1.5))
+        leakages = leakage(np.maximum(periods / 2.0, 1.5))  # half the periods in each half
         possible = 2.0 * np.sum(self._spectrum[periods] * leakages)
-        return change if change > possible else 0.0
+        if change <= possible:
+            return 0.0
+        return change
 
     @property
     def doubts(self) -> list[str]:
@@ -429,7 +431,9 @@ def course_text(times: FloatArray, powers: FloatArray, repeats: bool = False) ->
         The period, s, or 0, on the first line; then a line for each piece with its start and six
         coefficients, the constant first.
     """
-    period = float(times[-1]) if repeats else 0.0
+    period = 0.0
+    if repeats:
+        period = float(times[-1])
     lines = [repr(period)]
     missing_powers = [0.0] * (_POWERS_IN_TEXT - len(powers))
     pieces = powers[::-1].T.tolist()
@@ -555,9 +559,9 @@ def _check_resolution(rows: FloatArray) -> None:
     change = float(np.linalg.norm(difference) / size)
     if change > _LARGEST_COARSENESS:
         cause = "rows are too far apart, or too noisy"
-        found = f"leaving out every second one changes the acceleration by {change:.0%}"
+        effect = f"leaving out every second one changes the acceleration by {change:.0%}"
         expected = f"expected at most {_LARGEST_COARSENESS:.0%}"
-        raise ValueError(f"{cause}: {found} (root mean square); {expected}")
+        raise ValueError(f"{cause}: {effect} (root mean square); {expected}")
 
 
 def _check_times(time: FloatArray) -> None:
@@ -571,8 +575,8 @@ def _check_times(time: FloatArray) -> None:
     if repeated.mean() > _LARGEST_REPEATED_SHARE and (steps >= 0.0).all():
         row = int(np.argmax(repeated)) + 1
         same_time = f"{1e3 * time[row]:.6g} ms"
-        found = f"times repeat: rows {row} and {row + 1} are both at {same_time}"
-        raise ValueError(f"{found}; expected times with more digits, such as whole microseconds")
+        problem = f"times repeat: rows {row} and {row + 1} are both at {same_time}"
+        raise ValueError(f"{problem}; expected times with more digits, such as whole microseconds")
     usual_step = np.median(steps)
     too_long = steps > _UNEVEN_STEP * usual_step
     lost = too_long & (steps <= _LOST_STEP * usual_step)
@@ -581,6 +585,6 @@ def _check_times(time: FloatArray) -> None:
         uneven &= ~lost
     if uneven.any():
         first = np.argmax(uneven)
-        found = f"row {first + 2} is {1e3 * steps[first]:.6g} ms after the one before"
+        problem = f"row {first + 2} is {1e3 * steps[first]:.6g} ms after the one before"
         expected = "expected times that increase without gaps"
-        raise ValueError(f"{found}; {expected}, about {1e3 * usual_step:.6g} ms apart")
+        raise ValueError(f"{problem}; {expected}, about {1e3 * usual_step:.6g} ms apart")

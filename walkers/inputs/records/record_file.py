@@ -185,8 +185,11 @@ def _columns_of(heads: Sequence[str]) -> tuple[list[_Column], list[str]]:
     for number, field in enumerate(heads):
         head = field.strip()
         match = _NAME_AND_UNIT.fullmatch(head)
-        name = match["name"] if match else head
-        unit = match["unit"].strip() if match else ""
+        name = head
+        unit = ""
+        if match:
+            name = match["name"]
+            unit = match["unit"].strip()
         place = _place_of(name)
         if place is None:
             ignored.append(head or f"number {number + 1}")
@@ -212,7 +215,9 @@ def _check_columns(columns: Sequence[_Column], header: str) -> None:
     if not places:
         cure = "replace all lines above the numbers by a header"
         raise ValueError(f'{_EXPECTED_HEADER}, found "{quotation}": {cure}')
-    missing = "names no acceleration along x, y or z" if 0 in places else "names no time"
+    missing = "names no time"
+    if 0 in places:
+        missing = "names no acceleration along x, y or z"
     raise ValueError(f'{_EXPECTED_HEADER}; "{quotation}" {missing}')
 
 
@@ -247,21 +252,23 @@ def _check_length(fields: Sequence[str], number: int, heads: Sequence[str], sepa
     values = len(_without_empty_end(fields))
     if values <= len(heads):
         return
-    found = f"row {number} has {values} values, the header {len(heads)} names"
+    problem = f"row {number} has {values} values, the header {len(heads)} names"
     if separator == ",":
-        raise ValueError(f"{found}: decimal commas? Then separate the columns by semicolons")
-    raise ValueError(f"{found}; expected a name for each column")
+        raise ValueError(f"{problem}: decimal commas? Then separate the columns by semicolons")
+    raise ValueError(f"{problem}; expected a name for each column")
 
 
 def _row_of(fields: Sequence[str], number: int, columns: Sequence[_Column]) -> list[float]:
     """A row of the record, of the row of the file with a number."""
     row = [0.0, 0.0, 0.0, 0.0]
     for column in columns:
-        text = fields[column.number].strip() if column.number < len(fields) else ""
+        text = ""
+        if column.number < len(fields):
+            text = fields[column.number].strip()
         value = _number_of(text)
         if not isfinite(value):
-            found = f'row {number}: column "{column.head}" is "{text[:_LONGEST_QUOTATION]}"'
-            raise ValueError(f"{found}; expected a number")
+            problem = f'row {number}: column "{column.head}" is "{text[:_LONGEST_QUOTATION]}"'
+            raise ValueError(f"{problem}; expected a number")
         row[column.place] = value * column.factor
     return row
 
@@ -270,7 +277,9 @@ def _number_of(text: str) -> float:
     """The number of a text, which may have a decimal comma; NaN if it is none."""
     if text.count(",") == 1 and "." not in text:
         text = text.replace(",", ".")
-    return float(text) if _NUMBER.fullmatch(text) else nan
+    if _NUMBER.fullmatch(text) is None:
+        return nan
+    return float(text)
 
 
 def _check_decimal_commas(rows: Sequence[Sequence[str]], columns: Sequence[_Column]) -> None:

@@ -91,9 +91,10 @@ def _smoothed(samples: FloatArray, width: int) -> FloatArray:
 
 def _centred_window(samples: FloatArray, width: int) -> FloatArray:
     """Weights of the widest Hann window of an odd number of samples, one of them in its middle."""
-    longest_window = min(width, len(samples))
-    is_even = longest_window % 2 == 0
-    return hann(longest_window - 1 if is_even else longest_window)
+    points = min(width, len(samples))
+    if points % 2 == 0:
+        points -= 1
+    return hann(points)
 
 
 def local_amplitude(samples: FloatArray, frequency: float, width: int) -> FloatArray:
