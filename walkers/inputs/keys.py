@@ -54,7 +54,7 @@ def value_at(document: Any, parts: Sequence[str | int]) -> Any:
 
 
 def is_axis(value: object) -> bool:
-    """Whether a value is an axis or a range, such as ``{"linspace": …}``, no table of them."""
+    """Whether a value is an axis or a range, such as ``{"linspace": …}``, not a table of them."""
     if not isinstance(value, Mapping):
         return False
     return not value.keys().isdisjoint((*SPACINGS, *DISTRIBUTIONS))
