@@ -459,7 +459,7 @@ def test_the_record_has_quantiles_and_agreement_of_a_known_outcome(
     for agree, doubted in (([0, 1], False), ([0, 0], True)):  # of two facts
         said = calibration_summary({**found, "agree": dict(zip(names, agree, strict=False))})
         assert ("no set agrees with half" in said) == doubted
-    assert "| drag/friction |" in rendered("walkers.calibration", "report.md.j2", found=found)
+    assert "| drag/friction |" in rendered("walkers.calibration", "report.md.j2", {"found": found})
 
 
 # --- files ------------------------------------------------------------------------------------------------------------

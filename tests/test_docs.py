@@ -194,7 +194,7 @@ def test_the_page_of_the_comparison_is_of_todays_template() -> None:
     """Its sentences say when a fact agrees: `walkers.calibration.observations.Observation.agrees`."""
     page = DOCS / "figures" / "comparison.md"
     compared = read_json(page.with_suffix(".json"))
-    assert page.read_text("utf-8") == rendered("studies.paper", "comparison.md.j2", **compared)
+    assert page.read_text("utf-8") == rendered("studies.paper", "comparison.md.j2", compared)
 
 
 def test_the_table_of_performance_is_the_benchmarks() -> None:

@@ -180,7 +180,7 @@ def test_the_papers_curve_stands_beside_ours_uncounted(
 
 
 def test_the_table_is_of_all_of_it(compared: dict[str, Any]) -> None:
-    told = rendered("studies.paper", "comparison.md.j2", **compared)
+    told = rendered("studies.paper", "comparison.md.j2", compared)
     assert all(one["says"] in told and one["expected"] in told for one in compared["facts"])
     tables = [part.splitlines() for part in told.split("\n\n") if part.startswith("|")]
     assert [len({line.count("|") for line in table}) for table in tables] == [1] * 4
@@ -233,7 +233,7 @@ def test_figures_and_comparison_do_without_what_failed(
     assert missing["walks"]
     assert missing["fig4a_velocity"] is (lost is None)
     assert not any(one["agree"]["shipped"] for one in found["facts"] if missing[one["name"]])
-    assert rendered("studies.paper", "comparison.md.j2", **found).count("no walker") >= sum(
+    assert rendered("studies.paper", "comparison.md.j2", found).count("no walker") >= sum(
         missing.values()
     )
 

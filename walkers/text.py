@@ -12,14 +12,14 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 
-def rendered(package: str, template: str, **values: Any) -> str:
-    """The text of a template of a package.
+def rendered(package: str, template: str, values: Mapping[str, Any]) -> str:
+    """The text of a template of a package, with values by the names that the template uses.
 
     Filters: ``number`` (shortest text that reads back as the same double) and ``numbers`` of several, ``format`` as
     Python's for numbers, with a dash for missing ones, ``plain`` for a user's text in Markdown.
     `jinja2.UndefinedError` if it names a value that is not given.
     """
-    return environment(package).get_template(template).render(**values)
+    return environment(package).get_template(template).render(values)
 
 
 def printable(text: str) -> str:

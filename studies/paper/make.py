@@ -159,6 +159,6 @@ def _write_comparison(comparison: dict[str, Any], to: Path) -> list[Path]:
     """Write the comparison as a page and as JSON."""
     page, record = to / f"{COMPARISON}.md", to / f"{COMPARISON}.json"
     to.mkdir(parents=True, exist_ok=True)
-    write_bytes(page, rendered("studies.paper", "comparison.md.j2", **comparison).encode())
+    write_bytes(page, rendered("studies.paper", "comparison.md.j2", comparison).encode())
     write_json(record, comparison)
     return [page, record]

@@ -80,23 +80,22 @@ def readme(contents: Contents, authors: Sequence[str], licence: str | None) -> s
     """The ``README.md`` of an archive, whose commands are for the first of its runs; see `archive_record`."""
     example = contents.main[0]
     deck_folder = contents.deck_folder(example)
-    return rendered(
-        "walkers.archive",
-        "README.md.j2",
-        contents=contents,
-        by=", ".join(authors),
-        licence=licence or "",
-        paper=PAPER,
-        record=RECORD_FILE,
-        sums=SUMS_NAME,
-        example=example,
-        deck_folder=deck_folder,
-        has_tables=contents.has_tables(example),
-        ranks=contents.cases[example].run.ranks,
-        model_folder=MODEL_FOLDER,
-        model_sentence=_model_sentence(contents.manifests.values()),
-        repeat=REPEAT_NAME,
-    )
+    values = {
+        "contents": contents,
+        "by": ", ".join(authors),
+        "licence": licence or "",
+        "paper": PAPER,
+        "record": RECORD_FILE,
+        "sums": SUMS_NAME,
+        "example": example,
+        "deck_folder": deck_folder,
+        "has_tables": contents.has_tables(example),
+        "ranks": contents.cases[example].run.ranks,
+        "model_folder": MODEL_FOLDER,
+        "model_sentence": _model_sentence(contents.manifests.values()),
+        "repeat": REPEAT_NAME,
+    }
+    return rendered("walkers.archive", "README.md.j2", values)
 
 
 def _model_sentence(manifests: Collection[Mapping[str, Any]]) -> str:

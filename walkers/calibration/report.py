@@ -45,7 +45,9 @@ def write_outcome(outcome: Outcome, to: Path) -> list[Path]:
     write_bytes(files[0], samples.to_parquet(index=False))
     write_json(files[1], record)
     write_bytes(files[3], toml_bytes(best_case(calibration, outcome.sets[PROPOSED[0]], samples)))
-    write_bytes(files[2], rendered("walkers.calibration", "report.md.j2", found=record).encode())
+    write_bytes(
+        files[2], rendered("walkers.calibration", "report.md.j2", {"found": record}).encode()
+    )
     sources = [f"{calibration.name}-{part}" for part in ("named", "round", "proposed")]
     return files + save_figure(
         draw_facts(outcome), to / "predictions.png", sources, title=record["title"]

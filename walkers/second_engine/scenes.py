@@ -439,7 +439,7 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
         "angle": angle,
         "closest": closest,
     }
-    text = rendered("walkers.second_engine", "stock.lig.j2", **given)
+    text = rendered("walkers.second_engine", "stock.lig.j2", given)
     theirs = bench.run(replace(deck, text=text))
     error = farthest(ours.forces[..., :3], theirs.forces[..., :3])
     yield Line("two beads separate: force, Debian's own bridge model", 0.0, error, 1e-9)

@@ -209,33 +209,32 @@ def compose(plan: Plan) -> Deck:
     if len(scene.beads) > MOST_CREATED and not plan.restart_from:
         files[BEADS_NAME] = _beads_data(scene, case.beads.density, types=len(surfaces) + 1)
     limits = limits_of(case)
-    text = rendered(
-        "walkers.templates",
-        "walker.lig.j2",
-        plan=plan,
-        case=case,
-        scene=scene,
-        layout=layout,
-        names=_NAMES,
-        wall_words=[words for wall in scene.walls if (words := wall.deck_words())],
-        files=files,
-        named={},
-        printed=PRINTED,
-        in_cycles=in_cycles,
-        along=along,
-        types=len(surfaces) + 1,
-        ends=suffixes(len(case.excitation.harmonics)),
-        down=[component / gravity for component in case.gravity_vector] if gravity else [],
-        recorded={axis: AXES[axis] for axis in record.axes} if record else {},
-        start=_start(case.excitation),
-        shaken=plan.segment.drive_from is not None,
-        stable=min(vars(limits).values()),
-        contacts=contacts,
-        moduli=[contact.youngs_modulus for contact in (*contacts, case.contact)],
-        liquid=liquid if scalable else None,
+    values = {
+        "plan": plan,
+        "case": case,
+        "scene": scene,
+        "layout": layout,
+        "names": _NAMES,
+        "wall_words": [words for wall in scene.walls if (words := wall.deck_words())],
+        "files": files,
+        "named": {},
+        "printed": PRINTED,
+        "in_cycles": in_cycles,
+        "along": along,
+        "types": len(surfaces) + 1,
+        "ends": suffixes(len(case.excitation.harmonics)),
+        "down": [component / gravity for component in case.gravity_vector] if gravity else [],
+        "recorded": {axis: AXES[axis] for axis in record.axes} if record else {},
+        "start": _start(case.excitation),
+        "shaken": plan.segment.drive_from is not None,
+        "stable": min(vars(limits).values()),
+        "contacts": contacts,
+        "moduli": [contact.youngs_modulus for contact in (*contacts, case.contact)],
+        "liquid": liquid if scalable else None,
         **layout.bridge_terms(),
         **_search(plan),
-    )
+    }
+    text = rendered("walkers.templates", "walker.lig.j2", values)
     fastest = plan.fastest or fastest_of(case, scene)
     beyond = bool(limits.exceeded_by(case.run.time_step))
     # The engine writes once a sample, and several times a cycle.
