@@ -113,7 +113,7 @@ def json_bytes(contents: Mapping[str, Any]) -> bytes:
 
 def write_bytes(path: Path, contents: bytes, *, at_once: bool = True) -> None:
     """Write a file; see `write_json`."""
-    with beside(path) as new, new.open("wb") as file:
+    with replacing(path) as new, new.open("wb") as file:
         file.write(contents)
         if at_once:
             file.flush()
@@ -135,7 +135,7 @@ def link_or_copy(source: str | Path, to: str | Path) -> None:
 
 
 @contextmanager
-def beside(path: Path) -> Iterator[Path]:
+def replacing(path: Path) -> Iterator[Path]:
     """Yield a temporary path beside a file; it is renamed to the file at the end, or removed if the block fails."""
     # Several processes and threads may write it at once; writers of pictures and films need the suffix.
     new = path.with_name(f".{path.stem}.{os.getpid()}-{threading.get_ident()}.new{path.suffix}")

@@ -13,7 +13,7 @@ from walkers.archive.contents import README_FILE, RECORD_FILE, SUMS_NAME, Archiv
 from walkers.archive.description import archive_record, readme
 from walkers.errors import input_error
 from walkers.extras import require
-from walkers.files import beside, json_bytes
+from walkers.files import json_bytes, replacing
 from walkers.runner.manifest import FileChanged
 
 
@@ -69,7 +69,7 @@ def write_archive(
     sums = "".join(f"{file.sha256}  {place}\n" for place, file in files.items())
     # One date for all files: the same runs give the same bytes.
     date = datetime.fromisoformat(contents.finished).timetuple()[:6]
-    with beside(to) as new, zipfile.ZipFile(new, "w") as archive:
+    with replacing(to) as new, zipfile.ZipFile(new, "w") as archive:
         _write(archive, zipfile.ZipInfo(SUMS_NAME, date), ArchiveFile.of(sums.encode()))
         for place, file in files.items():
             _write(archive, zipfile.ZipInfo(place, date), file)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import input_error
-from walkers.files import beside, read_regular
+from walkers.files import read_regular, replacing
 from walkers.postprocess.measure.quantities import TABLES, declared, matches
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def write_table(directory: Path, name: str, columns: Columns) -> None:
         }
         fields.append(pa.field(column, array.type, metadata=metadata))
     reals = [field.name for field in fields if pa.types.is_floating(field.type)]
-    with beside(directory / f"{name}.parquet") as new:
+    with replacing(directory / f"{name}.parquet") as new:
         pq.write_table(
             pa.Table.from_arrays(arrays, schema=pa.schema(fields)),
             new,

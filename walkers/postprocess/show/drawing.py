@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 
 from walkers.errors import input_error
-from walkers.files import beside
+from walkers.files import replacing
 from walkers.text import printable
 
 if TYPE_CHECKING:
@@ -140,6 +140,6 @@ def save_figure(
     written = [path.with_suffix(f".{form}") for form in formats]
     for place in written:
         form = place.suffix[1:]
-        with beside(place) as new:
+        with replacing(place) as new:
             styled(figure.savefig)(new, format=form, metadata=metadata[form])
     return written

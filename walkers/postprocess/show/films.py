@@ -18,7 +18,7 @@ import numpy as np
 from walkers.arrays import FloatArray
 from walkers.errors import WalkersError, input_error
 from walkers.extras import require
-from walkers.files import beside
+from walkers.files import replacing
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.show import scene as view
 from walkers.postprocess.show.drawing import check_place
@@ -71,7 +71,7 @@ def render_film(
     scene = whole.following(wide / tall, _AROUND, frames)
     bridges = bridges_at(motion, times.frame)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with closing(view.Window(scene, options.size)) as window, beside(path) as new:
+    with closing(view.Window(scene, options.size)) as window, replacing(path) as new:
         write = _captions(scene, times, window.pixels_per_mm, options.size)
 
         def pictures(numbers: Iterable[int], tell: Tell | None = None) -> Iterator[view.Picture]:

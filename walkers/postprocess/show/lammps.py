@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from walkers.errors import check_limits
-from walkers.files import beside
+from walkers.files import replacing
 from walkers.postprocess.measure.motion import read_motion
 from walkers.postprocess.show.drawing import check_place
 
@@ -63,7 +63,7 @@ def write_trajectory(
         [np.arange(count) + 1, kinds, motion.walker_of + 1, _MM * motion.radius]
     )
     path.parent.mkdir(parents=True, exist_ok=True)
-    with beside(path) as new, new.open("w", encoding="ascii") as file:
+    with replacing(path) as new, new.open("w", encoding="ascii") as file:
         for time, position, velocity, spin in zip(
             motion.time, motion.position, motion.velocity, motion.spin, strict=True
         ):
