@@ -58,7 +58,7 @@ from walkers.runner.run_directory import (
 )
 from walkers.runs.making import make_runs
 from walkers.runs.names import find
-from walkers.templates.deck import RESTART_NAME, Deck, Segment, render_deck, whole
+from walkers.templates.deck import RESTART_NAME, Deck, Segment, render_deck, single_segment
 
 PATIENCE_OF_LOCKS = "walkers.runner.run_directory._PATIENCE_SECONDS"
 
@@ -605,7 +605,7 @@ def test_what_a_user_has_set_in_the_environment_does_not_matter(
 
 def test_lines_of_a_log_are_judged(tmp_path: Path) -> None:
     """A step that is printed twice; a calm line after a failure, read in one look."""
-    deck = render_deck(make_case(run=SHORT), whole(make_case(run=SHORT)))
+    deck = render_deck(make_case(run=SHORT), single_segment(make_case(run=SHORT)))
     twice, calm = (
         [(100, 0, 0.01), (100, 1, 0.01)],
         [(100, 0, 0.01), (200, 0, 1000.0), (300, 0, 0.01)],

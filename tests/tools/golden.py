@@ -28,7 +28,7 @@ from walkers import load_case, run
 from walkers.inputs.reading import shipped
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.case import Case
-from walkers.templates.deck import render_deck, whole
+from walkers.templates.deck import render_deck, single_segment
 
 ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = Path(__file__).with_name("golden.json")
@@ -71,7 +71,7 @@ def _cases(sweep: str) -> Iterator[tuple[str, Case, bool]]:
 
 def _of_deck(case: Case) -> list[str]:
     """Digests of deck, tables and layout of the first segment and of the whole run."""
-    decks = [render_deck(case), render_deck(case, whole(case))]
+    decks = [render_deck(case), render_deck(case, single_segment(case))]
     return [
         digest("".join(deck.text for deck in decks)),
         digest("".join(f"{name}\n{text}" for deck in decks for name, text in deck.files.items())),

@@ -20,7 +20,7 @@ from walkers.runs.by_hand import as_run, write_folder
 from walkers.runs.names import find
 from walkers.runs.removal import Removal, removal_text, remove, unfinished_in
 from walkers.sweeps.removal import named_in
-from walkers.templates.deck import RUN_NAME, render_deck, whole
+from walkers.templates.deck import RUN_NAME, render_deck, single_segment
 
 _REMOVED = (
     "Runs, with their spreads and accuracies, and sweeps, with the runs that no other sweep has."
@@ -80,7 +80,7 @@ def export(
     named = find(name, at.out, at.values)
     case = as_run(named.case, named.finished_run)
     if to is None:
-        print(render_deck(case, whole(case)).text, end="")
+        print(render_deck(case, single_segment(case)).text, end="")
     else:
         print(
             f"{write_folder(case, to)}    run it there with: sh {RUN_NAME}    then: walkers run {to}"

@@ -64,7 +64,7 @@ def write_folder(case: Case, folder: Path) -> Path:
 
     `InputError` if the folder exists or cannot be made; errors of `find_engine` and `plugin_of`.
     """
-    deck, engine = decks.render_deck(case, decks.whole(case)), find_engine()
+    deck, engine = decks.render_deck(case, decks.single_segment(case)), find_engine()
     plugin = plugin_of(engine)
     try:
         folder.mkdir(parents=True)

@@ -142,7 +142,7 @@ def next_segment(case: Case, begin: int = 0, start: int | None = None) -> Segmen
     return Segment(begin, end, start)
 
 
-def whole(case: Case) -> Segment:
+def single_segment(case: Case) -> Segment:
     """A run in one segment, as by hand: enough time to rest for most piles, and the cycles of the first attempt."""
     rest = RESTING_SEGMENTS * settling_steps(case) if case.run.rests else 0
     return Segment(0, rest + case.run.attempts[0] * case.run.steps_per_cycle, rest)
