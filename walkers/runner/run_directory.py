@@ -284,7 +284,7 @@ def has_tables_of(segment: Path, deck: Deck) -> bool:
 
 
 @contextmanager
-def room_on_disk(incomplete: Path, needed: int | None = None) -> Iterator[None]:
+def write_errors_as_failures(incomplete: Path, needed: int | None = None) -> Iterator[None]:
     """Turn errors of the system while a run is written into failures of the run.
 
     Parameters

@@ -293,7 +293,7 @@ class OpenRun:
                 "by another version, or on another kind of machine; "
                 f"delete {self.directory} and repeat the run, or continue it there"
             )
-        with run_directory.room_on_disk(new, deck.layout.bead_dump_bytes):
+        with run_directory.write_errors_as_failures(new, deck.layout.bead_dump_bytes):
             new.mkdir()
             run_directory.write_deck(deck, new, before if number else None)
             if segment.begin:
@@ -367,7 +367,7 @@ def open_locked(
     if anew:
         shutil.rmtree(directory, ignore_errors=True)
     try:
-        with run_directory.room_on_disk(directory):
+        with run_directory.write_errors_as_failures(directory):
             (directory / run_directory.SEGMENTS).mkdir(parents=True, exist_ok=True)
             # Left by an earlier call, besides complete segments: tables, incomplete files and segments.
             for path in (*directory.iterdir(), *(directory / run_directory.SEGMENTS).glob("*.new")):
@@ -423,7 +423,7 @@ def _make_together(
     incomplete = run_directory.unfinished(out / first)
     shutil.rmtree(incomplete, ignore_errors=True)
     try:
-        with run_directory.room_on_disk(incomplete, deck.layout.bead_dump_bytes):
+        with run_directory.write_errors_as_failures(incomplete, deck.layout.bead_dump_bytes):
             check_room(
                 out, 2 * deck.layout.bead_dump_bytes
             )  # the dump and its parts exist at the same time
