@@ -96,13 +96,13 @@ def launch(
     lock of the run). If it ends before it prints its version, it is started again, three times in all.
     """
     ranks, temporary = deck.layout.ranks, Path(os.environ.get("TMPDIR", "/tmp"))
-    check_room(directory, deck.layout.bead_dump_bytes)
+    check_free_space(directory, deck.layout.bead_dump_bytes)
     if ranks > 1 and shutil.which("mpirun") is None:
         raise failures.EngineNeverStarted(
             f"run.ranks = {ranks} needs mpirun: apt-get install openmpi-bin", directory
         )
     if ranks > 1 and temporary.is_dir():
-        check_room(temporary, _TEMPORARY_BYTES)
+        check_free_space(temporary, _TEMPORARY_BYTES)
     plugin = plugin_of(engine)
     write_run_script(directory, engine, plugin, ranks)
     command = [
@@ -145,7 +145,7 @@ def judge(deck: Deck, directory: Path, log: Path) -> EngineReport:
     return report
 
 
-def check_room(folder: Path, needed: int) -> None:
+def check_free_space(folder: Path, needed: int) -> None:
     """Raise `DiskFull` unless the disk of a folder has room for the ``needed`` bytes and a reserve."""
     free = shutil.disk_usage(folder).free
     if free < needed + _SPARE_BYTES:

@@ -30,7 +30,7 @@ from walkers.rounding import duration_text
 from walkers.runner import run_directory
 from walkers.runner.binary import Engine
 from walkers.runner.failures import BeadsOverTheTop
-from walkers.runner.launch import EngineReport, check_room, last_step, launch
+from walkers.runner.launch import EngineReport, check_free_space, last_step, launch
 from walkers.runner.manifest import write_manifest
 from walkers.templates import deck as decks
 from walkers.templates.deck import Deck, Segment
@@ -424,7 +424,7 @@ def _make_together(
     shutil.rmtree(incomplete, ignore_errors=True)
     try:
         with run_directory.write_errors_as_failures(incomplete, deck.layout.bead_dump_bytes):
-            check_room(
+            check_free_space(
                 out, 2 * deck.layout.bead_dump_bytes
             )  # the dump and its parts exist at the same time
             (incomplete / DECK_FOLDER).mkdir(parents=True)
