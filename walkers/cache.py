@@ -141,7 +141,7 @@ def place_of_numbers(kind: str, key: bytes) -> Path:
     return cache_folder() / kind / f"{sha256(key).hexdigest()[:24]}.bin"
 
 
-def kept_numbers(
+def cached_numbers(
     place: Path, compute: Callable[[], npt.NDArray[np.float64]]
 ) -> npt.NDArray[np.float64]:
     """Numbers that are kept at a place of the cache.

@@ -15,7 +15,7 @@ from math import inf, pi, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from walkers.cache import kept_numbers, place_of_numbers
+from walkers.cache import cached_numbers, place_of_numbers
 from walkers.physics.portable import cosine, cube_root
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def _volume_by_suction(
         return np.array([volume_at_contact(*bridge)])
 
     place = place_of_numbers("menisci", solver() + repr(bridge).encode())
-    return float(kept_numbers(place, compute)[0])
+    return float(cached_numbers(place, compute)[0])
 
 
 @cache

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 
 from walkers.arrays import FloatArray
-from walkers.cache import is_trusted, kept_numbers, place_of_numbers
+from walkers.cache import cached_numbers, is_trusted, place_of_numbers
 from walkers.physics import reynolds
 from walkers.physics.bridge import Curve, Surfaces
 from walkers.physics.capillary import solver
@@ -85,7 +85,7 @@ def _solved(shape: _Shape) -> tuple[float, Chebyshev]:
     """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's
     radius.
     """
-    numbers = kept_numbers(_place(shape), lambda: _solve(shape))
+    numbers = cached_numbers(_place(shape), lambda: _solve(shape))
     return float(numbers[0]), Chebyshev(numbers[1:], domain=[0.0, 1.0])
 
 
