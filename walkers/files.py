@@ -101,9 +101,9 @@ def read_json(path: Path) -> dict[str, Any]:
     return value
 
 
-def write_json(path: Path, contents: Mapping[str, Any], *, at_once: bool = True) -> None:
-    """Write a JSON object; ``at_once`` is False if the whole directory is flushed to disk later."""
-    write_bytes(path, json_bytes(contents), at_once=at_once)
+def write_json(path: Path, contents: Mapping[str, Any], *, sync: bool = True) -> None:
+    """Write a JSON object; ``sync`` is False if the whole directory is flushed to disk later."""
+    write_bytes(path, json_bytes(contents), sync=sync)
 
 
 def json_bytes(contents: Mapping[str, Any]) -> bytes:
@@ -111,11 +111,11 @@ def json_bytes(contents: Mapping[str, Any]) -> bytes:
     return (json.dumps(contents, indent=2, ensure_ascii=False) + "\n").encode("utf-8")
 
 
-def write_bytes(path: Path, contents: bytes, *, at_once: bool = True) -> None:
+def write_bytes(path: Path, contents: bytes, *, sync: bool = True) -> None:
     """Write a file; see `write_json`."""
     with replacing(path) as new, new.open("wb") as file:
         file.write(contents)
-        if at_once:
+        if sync:
             file.flush()
             os.fsync(file.fileno())
 

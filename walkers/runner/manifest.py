@@ -73,7 +73,7 @@ def write_manifest(
         "sha256": checksums(directory, files),
         **more,
     }
-    write_json(directory / MANIFEST_NAME, contents, at_once=False)
+    write_json(directory / MANIFEST_NAME, contents, sync=False)
 
 
 def read_manifest(directory: Path) -> dict[str, Any]:

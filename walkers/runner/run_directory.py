@@ -165,18 +165,18 @@ def with_recorded_law(case: Case, directory: Path) -> Case:
 
 def write_case(directory: Path, case: Case) -> None:
     """Write the resolved case of a run, and of a user's law its file and the tables of its bridges."""
-    write_json(directory / CASE_NAME, case.as_dict(), at_once=False)
+    write_json(directory / CASE_NAME, case.as_dict(), sync=False)
     if case.liquid.law in LAWS:
         return
     tables = bridge_tables_of(
         case, [(case.contact, case.liquid.of_bridges)], {(1, radius) for radius in case.radii}
     )
-    write_bytes(directory / BRIDGES_NAME, tables.encode("utf-8"), at_once=False)
+    write_bytes(directory / BRIDGES_NAME, tables.encode("utf-8"), sync=False)
     file = None if case.recorded_law else source_of(case.liquid.law)
     if (
         source := file.read_bytes() if file else getattr(case.recorded_law, "source", None)
     ) is not None:
-        write_bytes(directory / LAW_NAME, source, at_once=False)
+        write_bytes(directory / LAW_NAME, source, sync=False)
 
 
 def read_layout(segment: Path) -> DeckLayout:
@@ -257,7 +257,7 @@ def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
             link_or_copy(before / name, directory / name)
         else:
             (directory / name).write_bytes(contents)
-    write_json(directory / LAYOUT_NAME, deck.layout.as_dict(), at_once=False)
+    write_json(directory / LAYOUT_NAME, deck.layout.as_dict(), sync=False)
 
 
 def write_segment_record(
@@ -274,7 +274,7 @@ def write_segment_record(
         "root_mean_square_velocity": rms_velocity,
         **more,
     }
-    write_json(directory / SEGMENT_NAME, record, at_once=False)
+    write_json(directory / SEGMENT_NAME, record, sync=False)
     return record
 
 

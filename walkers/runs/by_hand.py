@@ -172,8 +172,8 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
     if _age(deck) > _age(log):
         notes.append(f"{deck.name} is newer than {log.name}: if it was edited since, run it again")
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
-    write_json(folder / run_directory.CASE_NAME, case.as_dict(), at_once=False)
-    write_json(folder / decks.LAYOUT_NAME, rendered.layout.as_dict(), at_once=False)
+    write_json(folder / run_directory.CASE_NAME, case.as_dict(), sync=False)
+    write_json(folder / decks.LAYOUT_NAME, rendered.layout.as_dict(), sync=False)
     run_directory.write_segment_record(
         folder, segment, report, by_hand=notes, deck_edited=bool(edits)
     )

@@ -51,7 +51,7 @@ def split_output(directory: Path, layout: DeckLayout, cases: Mapping[Path, Case]
             for index, walker in enumerate(walkers_of_case)
         )
         layout_of_case = replace(layout, atoms=len(old), walkers=placed, ranks=1)
-        write_json(place / LAYOUT_NAME, layout_of_case.as_dict(), at_once=False)
+        write_json(place / LAYOUT_NAME, layout_of_case.as_dict(), sync=False)
     for name, columns, ids in (
         (layout.pair_bridge_dump, layout.pair_bridge_columns, ("id1", "id2")),
         (layout.wall_bridge_dump, layout.wall_bridge_columns, ("id",)),
