@@ -29,11 +29,11 @@ class EngineFailure(WalkersError):
 
     Notes
     -----
-    ``hits`` says which points of a sweep such a failure hits: every point; all at first, until a point is finished; one
+    ``affects`` tells which points of a sweep such a failure affects: every point; all at first, until a point is finished; one
     point; or empty if this is not certain.
     """
 
-    hits = ""
+    affects = ""
 
     def __init__(self, message: str, directory: Path | None = None, *, lost: int = 0) -> None:
         self.message = message
@@ -41,16 +41,16 @@ class EngineFailure(WalkersError):
         self.lost = lost
         super().__init__(f"{message} (see {directory})" if directory else message)
 
-    def __init_subclass__(cls, hits: str = "") -> None:
+    def __init_subclass__(cls, affects: str = "") -> None:
         """Mark a class and the classes that derive from it."""
-        cls.hits = hits or cls.hits
+        cls.affects = affects or cls.affects
 
 
-class EngineMissing(EngineFailure, hits="every point"):
+class EngineMissing(EngineFailure, affects="every point"):
     """No liggghts was found. Detected before anything is written."""
 
 
-class OtherEngine(EngineFailure, hits="every point"):
+class OtherEngine(EngineFailure, affects="every point"):
     """The contact model was written for another version of the engine."""
 
     def __init__(self, path: Path, version: str) -> None:
@@ -58,22 +58,22 @@ class OtherEngine(EngineFailure, hits="every point"):
         super().__init__(f"{path} is {version}: {needed}")
 
 
-class ContactModelMissing(EngineFailure, hits="every point"):
+class ContactModelMissing(EngineFailure, affects="every point"):
     """The contact model cannot be compiled. Detected before the engine starts."""
 
     def __init__(self, why: str) -> None:
         super().__init__(f"no contact model for the engine: {why}")
 
 
-class EngineDiffers(EngineFailure, hits="every point"):
+class EngineDiffers(EngineFailure, affects="every point"):
     """A worker of a sweep has another engine than the process that started the sweep."""
 
 
-class ProgramDiffers(EngineFailure, hits="every point"):
+class ProgramDiffers(EngineFailure, affects="every point"):
     """A worker gives a run another name than the process that started the sweep: resolved cases or decks differ."""
 
 
-class EngineNeverStarted(EngineFailure, hits="all at first"):
+class EngineNeverStarted(EngineFailure, affects="all at first"):
     """The engine ended before it printed its version, also when it was started again."""
 
 
@@ -97,7 +97,7 @@ class MissingFrames(EngineFailure):
     """The engine ended normally, but a dump is too short."""
 
 
-class BeadsLost(EngineFailure, hits="one point"):
+class BeadsLost(EngineFailure, affects="one point"):
     """Beads left the simulation box. Detected from the number of atoms, which the engine prints every cycle."""
 
 
@@ -105,15 +105,15 @@ class BeadsOverTheTop(BeadsLost):
     """Beads left the simulation box at its top: before, the bead closest to its sides was the highest one."""
 
 
-class BlowUp(EngineFailure, hits="one point"):
+class BlowUp(EngineFailure, affects="one point"):
     """A bead is faster than the drive can make it, or its speed is NaN; usually the time step is too long."""
 
 
-class TimeLimitExceeded(EngineFailure, hits="one point"):
+class TimeLimitExceeded(EngineFailure, affects="one point"):
     """The run exceeded its time limit."""
 
 
-class DiskFull(EngineFailure, hits="every point"):
+class DiskFull(EngineFailure, affects="every point"):
     """No room for the output. Detected before the run from the known size of the dump, or while the engine writes."""
 
     def __init__(self, needed: int | None, free: int, directory: Path) -> None:
@@ -121,7 +121,7 @@ class DiskFull(EngineFailure, hits="every point"):
         super().__init__(f"disk full: {missing}{free / 1e6:.3g} MB are free", directory)
 
 
-class FileTooLarge(EngineFailure, hits="every point"):
+class FileTooLarge(EngineFailure, affects="every point"):
     """A file of the run exceeds the limit of the shell (``ulimit -f``) or of the file system."""
 
     def __init__(self, directory: Path) -> None:
@@ -134,22 +134,22 @@ class FileTooLarge(EngineFailure, hits="every point"):
         super().__init__(text, directory)
 
 
-class OutputGone(EngineFailure, hits="every point"):
+class OutputGone(EngineFailure, affects="every point"):
     """The directory of a run or a sweep was removed during the run."""
 
     def __init__(self, directory: Path) -> None:
         super().__init__(f"{directory} was removed while it was written")
 
 
-class WalkersMet(EngineFailure, hits="one point"):
+class WalkersMet(EngineFailure, affects="one point"):
     """Walkers of different cases in a shared deck came close to each other. Detected when the output is split."""
 
 
-class RunBusy(EngineFailure, hits="one point"):
+class RunBusy(EngineFailure, affects="one point"):
     """Another process, perhaps an engine whose launcher was killed, is writing into this run."""
 
 
-class AuditFailed(EngineFailure, hits="every point"):
+class AuditFailed(EngineFailure, affects="every point"):
     """The engine's binary failed its audit: its results cannot be trusted."""
 
 

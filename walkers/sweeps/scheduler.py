@@ -152,7 +152,7 @@ class Failure:
     directory
         Directory of the unfinished run; None if there is none.
     hits
-        Which points such a failure hits, see `walkers.runner.failures.EngineFailure`.
+        Which points such a failure affects, see `walkers.runner.failures.EngineFailure`.
     cause
         The message without the directory: the same of points that fail alike.
     """
@@ -456,7 +456,9 @@ def work(
         elif isinstance(error, OSError) and error.filename:
             kind = OutputGone if error.errno == errno.ENOENT else kind
             message = cause = f"{error.filename}: {error.strerror}"
-        return Failure(-1, "", kind.__name__, message, directory, getattr(kind, "hits", ""), cause)
+        return Failure(
+            -1, "", kind.__name__, message, directory, getattr(kind, "affects", ""), cause
+        )
 
 
 @contextmanager
