@@ -45,7 +45,7 @@ from walkers.runner.binary import find_engine
 from walkers.runner.compiled_model import plugin_of
 from walkers.runner.failures import EngineNeverStarted
 from walkers.runner.launch import EngineReport, judge
-from walkers.runner.manifest import read_manifest, write_manifest
+from walkers.runner.manifest import FinishedRun, read_manifest, write_manifest
 from walkers.runner.run_directory import (
     FIRST_SEGMENT,
     case_of,
@@ -655,14 +655,16 @@ def test_a_pile_without_dumps_has_no_restart_files(pile_run: Path, tmp_path: Pat
 def test_steps_per_second_are_those_of_the_engines_loop(tmp_path: Path) -> None:
     """1000 steps in 2 s; the engine also took 2 s to start."""
     report = EngineReport("LIGGGHTS", wall_seconds=4.0, loop_seconds=2.0, steps=1000)
-    write_manifest(
-        make_case(),
-        "test-0123456789ab",
-        None,
-        report,
+    run = FinishedRun(
+        case=make_case(),
+        name="test-0123456789ab",
+        engine=None,
+        report=report,
         started=time.time() - 5.0,
-        directory=tmp_path,
+        segments=1,
+        drive_from=0,
     )
+    write_manifest(tmp_path, run)
     manifest = read_manifest(tmp_path)
     assert (manifest["steps"], manifest["steps_per_second"]) == (1000, 500.0)
     assert (manifest["seconds"]["engine"], manifest["seconds"]["engine_loop"]) == (4.0, 2.0)

@@ -19,8 +19,9 @@ import os
 import re
 import shutil
 import time
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -74,6 +75,22 @@ _PATIENCE_SECONDS = 2.0
 
 
 # --- names ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ByHand:
+    """What the record of a run tells that was made by hand.
+
+    Attributes
+    ----------
+    notes
+        Sentences for the user about the run.
+    deck_edited
+        Whether its deck was edited.
+    """
+
+    notes: Sequence[str]
+    deck_edited: bool
 
 
 def run_place(case: Case, engine: Engine, out: Path) -> Path:
@@ -265,15 +282,17 @@ def write_segment_record(
     segment: Segment,
     report: EngineReport,
     rms_velocity: float | None = None,
-    **more: Any,
+    by_hand: ByHand | None = None,
 ) -> dict[str, Any]:
     """Write the steps and the cost of a segment into its directory, and return this record."""
     record = {
         **segment._asdict(),
         **vars(report),
         "root_mean_square_velocity": rms_velocity,
-        **more,
     }
+    if by_hand is not None:
+        record["by_hand"] = list(by_hand.notes)
+        record["deck_edited"] = by_hand.deck_edited
     write_json(directory / SEGMENT_NAME, record, sync=False)
     return record
 

@@ -30,7 +30,13 @@ from walkers.runner.binary import find_engine
 from walkers.runner.compiled_model import plugin_of, write_run_script
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.launch import judge
-from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest, write_manifest
+from walkers.runner.manifest import (
+    MANIFEST_NAME,
+    FinishedRun,
+    checksums,
+    read_manifest,
+    write_manifest,
+)
 from walkers.runs.case_text import quantity_kind
 from walkers.templates import deck as decks
 from walkers.templates.deck import PRINTED, Segment, suffixes
@@ -175,7 +181,7 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
     write_json(folder / run_directory.CASE_NAME, case.as_dict(), sync=False)
     write_json(folder / decks.LAYOUT_NAME, rendered.layout.as_dict(), sync=False)
     run_directory.write_segment_record(
-        folder, segment, report, by_hand=notes, deck_edited=bool(edits)
+        folder, segment, report, by_hand=run_directory.ByHand(notes, bool(edits))
     )
     # Cycles that were enough for the finished run of a case may be too few for an edited deck.
     planned = before.run
@@ -187,13 +193,23 @@ def _measure(folder: Path, deck: Path, log: Path) -> None:
         more = f"{planned.cycles}, as walkers run does," if planned.until_steady else "more"
         notes.append(f"{reached}; set cycles to {more} and run again")
         run_directory.write_segment_record(
-            folder, segment, report, by_hand=notes, deck_edited=bool(edits)
+            folder, segment, report, by_hand=run_directory.ByHand(notes, bool(edits))
         )
     measure(folder)
-    about: dict[str, Any] = {"drive_from": rest, "segments": 1, "by_hand": notes}
     scaled = folder / decks.SCALED_BRIDGES_NAME
-    about["bridge_tables"] = checksum(scaled if scaled.is_file() else folder / decks.BRIDGES_NAME)
-    write_manifest(case, folder.name, None, report, started=time.time(), directory=folder, **about)
+    tables = scaled if scaled.is_file() else folder / decks.BRIDGES_NAME
+    finished = FinishedRun(
+        case=case,
+        name=folder.name,
+        engine=None,
+        report=report,
+        started=time.time(),
+        segments=1,
+        drive_from=rest,
+        by_hand=notes,
+        bridge_tables=checksum(tables),
+    )
+    write_manifest(folder, finished)
 
 
 def _parameters(deck: str, values: Mapping[str, float]) -> dict[str, float]:

@@ -31,7 +31,7 @@ from walkers.runner import run_directory
 from walkers.runner.binary import Engine
 from walkers.runner.failures import BeadsOverTheTop
 from walkers.runner.launch import EngineReport, check_free_space, last_step, launch
-from walkers.runner.manifest import write_manifest
+from walkers.runner.manifest import FinishedRun, write_manifest
 from walkers.templates import deck as decks
 from walkers.templates.deck import Deck, Segment
 
@@ -332,14 +332,18 @@ class OpenRun:
         rest = [
             segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start
         ]
-        about: dict[str, Any] = {
-            "started": self.started,
-            "directory": self.directory,
-            "segments": len(self.done),
-        }
-        about |= {"drive_from": start, "settled": rest[-1] if rest else None}
-        about |= {"ended": self.ended} if self.ended else {}
-        write_manifest(self.case, self.place.name, self.engine, report, **about)
+        finished = FinishedRun(
+            case=self.case,
+            name=self.place.name,
+            engine=self.engine,
+            report=report,
+            started=self.started,
+            segments=len(self.done),
+            drive_from=start,
+            settled=rest[-1] if rest else None,
+            ended=self.ended,
+        )
+        write_manifest(self.directory, finished)
         os.sync()
         run_directory.move_into_place(self.directory, self.place)
 
@@ -445,17 +449,19 @@ def _make_together(
                 if cycles >= cases[name].run.cycles or _are_constant(incomplete / name)
             ]
             shared = {"first": first, "runs": len(done), "walkers": len(deck.layout.walkers)}
-            about: dict[str, Any] = {
-                "started": started,
-                "drive_from": 0,
-                "segments": 1,
-                "shared_deck": shared,
-            }
             for name in done:
                 measure(incomplete / name)
-                write_manifest(
-                    cases[name], name, engine, report, directory=incomplete / name, **about
+                finished = FinishedRun(
+                    case=cases[name],
+                    name=name,
+                    engine=engine,
+                    report=report,
+                    started=started,
+                    segments=1,
+                    drive_from=0,
+                    shared_deck=shared,
                 )
+                write_manifest(incomplete / name, finished)
             os.sync()
             for name in done:
                 run_directory.move_into_place(incomplete / name, out / name)
