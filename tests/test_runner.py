@@ -40,7 +40,7 @@ from walkers import run as run_case
 from walkers.cache import is_trusted
 from walkers.inputs.tables.case import Case
 from walkers.physics.laws import young_laplace
-from walkers.runner import audit, failures, model_sources
+from walkers.runner import audit, failures, model_sources, run_directory
 from walkers.runner.binary import find_engine
 from walkers.runner.compiled_model import plugin_of
 from walkers.runner.failures import EngineNeverStarted
