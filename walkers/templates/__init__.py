@@ -1,6 +1,7 @@
 """Decks: the input scripts of LIGGGHTS.
 
-Uses cases (`inputs`), not processes, files on disk or results. docs/explanation/engine.md explains the decks.
+Uses cases (`inputs`), not processes, files on disk or results. docs/explanation/engine.md explains
+the decks.
 """
 
 if __name__ != "walkers.templates":

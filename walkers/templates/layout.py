@@ -1,4 +1,8 @@
-"""Layout of the output of a deck: columns, frames, and the walker of each bead."""
+"""Layout of the output of a deck: columns, frames, and the walker of each bead.
+
+A run stores the layout as ``layout.json``, from which its dumps are read
+(`walkers.postprocess.measure.dump`).
+"""
 
 from __future__ import annotations
 
@@ -23,11 +27,14 @@ BEAD_COLUMNS = (
 )
 """Columns of the bead dump, in the engine's names (m, m/s, rad/s)."""
 MEAN_SPIN_COLUMNS = ("f_mean_spin[1]", "f_mean_spin[2]", "f_mean_spin[3]")
-"""Further columns for walkers: angular velocity, averaged over the steps since the last frame (rad/s)."""
+"""Further columns for walkers: mean angular velocity over the steps since the last frame, rad/s."""
 FILM_COLUMN = "f_film"
-"""Further column where liquid is conserved: liquid on the bead (not in bridges) over its whole liquid."""
+"""Further column where liquid is conserved: the film on the bead as a share of the bead's liquid.
+
+Bridges take their liquid from the film.
+"""
 FORCE_COLUMNS = ("fx", "fy", "fz", "tqx", "tqy", "tqz")
-"""Optional further columns (N, N m)."""
+"""Optional further columns: force (N) and torque (N m)."""
 
 PAIR_BRIDGES = {
     "x1 y1 z1 x2 y2 z2": "pos",
@@ -35,7 +42,7 @@ PAIR_BRIDGES = {
     "fx fy fz": "force",
     "overlap": "delta",
 }
-"""Output of the engine for bridges between beads, in its order: columns and the option that gives them."""
+"""Columns that the engine gives for bridges between beads, in its order, with their options."""
 WALL_BRIDGES = (
     "x",
     "y",
@@ -50,19 +57,35 @@ WALL_BRIDGES = (
     "fz",
     "overlap",
 )
-"""Output of the fix of the walls for bridges to walls, in its order: foot, bead, number of the wall, …"""
+"""Columns that the fix of the walls gives for bridges to walls, in its order.
+
+The foot of the bridge and the centre of the bead (m), the numbers of the wall and of the bead, the
+force (N) and the overlap (m).
+"""
 PAIR_BRIDGE_COLUMNS = ("id1", "id2", "fx", "fy", "fz", "overlap")
-"""Columns of the dump of bridges between beads; the force acts on bead ``id1``."""
+"""Columns of the dump of bridges between beads; the force (N) acts on bead ``id1``."""
 WALL_BRIDGE_COLUMNS = ("wall", "id", "fx", "fy", "fz", "overlap")
-"""Columns of the dump of bridges to walls: number of the wall, force on bead ``id``."""
+"""Columns of the dump of bridges to walls: number of the wall, force (N) on bead ``id``."""
 
 
 @dataclass(frozen=True)
 class PlacedWalker:
-    """One walker of a deck: number of its make in the case, ids of its beads, and its start.
+    """One walker of a deck and its start.
 
-    ``facing`` is +1 along the drive axis (right) or −1 (left); ``start_angle`` (rad) is measured from there; ``origin``
-    in m.
+    Attributes
+    ----------
+    walker
+        Its number in the deck, from 0.
+    make
+        Number of its kind in the case, from 0.
+    beads
+        Numbers of its beads in the engine.
+    facing
+        +1 along the drive axis (right) or −1 (left).
+    start_angle
+        Angle from that direction, rad.
+    origin
+        Its place, x and y in m.
     """
 
     walker: int
@@ -75,7 +98,37 @@ class PlacedWalker:
 
 @dataclass(frozen=True, kw_only=True)
 class DeckLayout:
-    """Dumps of a deck (file names, columns, steps between frames, frames expected) and its walkers."""
+    """Dumps of a deck, and its walkers.
+
+    Attributes
+    ----------
+    bead_dump
+        Name of the dump of beads.
+    bead_columns
+        Its columns.
+    sample_every
+        Steps between its frames.
+    frames
+        Number of its frames.
+    pair_bridge_dump, wall_bridge_dump
+        Names of the dumps of bridges between beads and of bridges to walls.
+    pair_bridge_columns, wall_bridge_columns
+        Their columns.
+    bridge_every
+        Steps between their frames.
+    bridge_frames
+        Number of their frames.
+    atoms
+        Number of beads.
+    steps
+        Last step of the deck.
+    time_step
+        Time step, s.
+    walkers
+        The walkers; empty in a pile.
+    ranks
+        Number of MPI processes.
+    """
 
     bead_dump: str = "beads.bin"
     bead_columns: tuple[str, ...]
@@ -95,7 +148,9 @@ class DeckLayout:
 
     @property
     def bead_dump_bytes(self) -> int:
-        """Size of the complete bead dump."""
+        """Size of the complete bead dump, bytes."""
+        # A frame: step and number of atoms, triclinic flag, kinds and positions of six boundaries,
+        # number of columns and of blocks; then for each rank the size of its block and the values.
         header = 8 + 8 + 4 + 6 * 4 + 6 * 8 + 4 + 4 + 4 * self.ranks
         return self.frames * (header + 8 * self.atoms * len(self.bead_columns))
 
@@ -105,18 +160,20 @@ class DeckLayout:
         return self.bead_dump, self.pair_bridge_dump, self.wall_bridge_dump
 
     def bridge_terms(self) -> dict[str, Any]:
-        """What the engine calls the columns of bridges, and the options that give those between beads."""
-        pairs = " ".join(PAIR_BRIDGES).split()
+        """The words of the deck for the columns of bridges, by their names in the blocks.
+
+        The options of the compute that gives bridges between beads, and the terms of both dumps:
+        column k of the compute or of the fix is ``…[k]``.
+        """
+        pair_terms = " ".join(PAIR_BRIDGES).split()
+        pair_numbers = [pair_terms.index(column) + 1 for column in self.pair_bridge_columns]
+        wall_numbers = [WALL_BRIDGES.index(column) + 1 for column in self.wall_bridge_columns]
         return {
             "pair_bridge_options": " ".join(PAIR_BRIDGES.values()),
-            "pair_bridge_terms": [
-                f"c_pair_bridges[{pairs.index(column) + 1}]" for column in self.pair_bridge_columns
-            ],
-            "wall_bridge_terms": [
-                f"f_walls[{WALL_BRIDGES.index(column) + 1}]" for column in self.wall_bridge_columns
-            ],
+            "pair_bridge_terms": [f"c_pair_bridges[{number}]" for number in pair_numbers],
+            "wall_bridge_terms": [f"f_walls[{number}]" for number in wall_numbers],
         }
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types."""
+        """The layout in plain JSON types."""
         return asdict(self)
