@@ -10,7 +10,6 @@ import hashlib
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import chain
 from math import inf, log2
 
 import numpy as np
@@ -21,17 +20,34 @@ from walkers.physics.bridge import BridgeLaw, Curve, Forces, Surfaces, UnusableL
 from walkers.templates.placement import Surface
 
 TOLERANCE = 1e-6
-"""Tolerance of interpolated forces, relative to a column's largest value within a factor of two of the gap."""
-_COARSE = 1e-4
+"""Tolerance of interpolated forces, relative to the larger value at the gap and at half of it."""
+_COARSE_TOLERANCE = 1e-4
 """The same where liquid is conserved: volumes are steps, and there are ten times as many tables."""
-_COARSEST, _FINEST = 8, 256
+_COARSEST_CELLS = 8
+"""Cells per octave of the coarsest table."""
+_FINEST_CELLS = 256
+"""Cells per octave of the finest table."""
+_ROW_FORMAT = "%.12g"
+"""Format of a number in the engine's file: twelve digits, far more accurate than `TOLERANCE`."""
 
 
 @dataclass(frozen=True)
 class BridgeTable:
-    """The table of a law for two surfaces, as the engine reads it: a curve, the grid (``scale`` in m), and forces.
+    """The table of a law for two surfaces, as the engine reads it.
 
-    ``rows`` are the forces at its gaps, shape (3 cells (octaves + 2) + 1, 5), as `walkers.physics.bridge.Forces`.
+    Attributes
+    ----------
+    curve
+        The law for the two surfaces.
+    scale
+        Gap over which the forces vary near contact, m: the first octave.
+    octaves
+        Number of octaves near contact, each twice as long as the one before.
+    cells
+        Cells per octave; beyond the octaves there are twice as many.
+    rows
+        The columns of `walkers.physics.bridge.Forces` at `gaps`, shape
+        (3 cells (octaves + 2) + 1, 5).
     """
 
     curve: Curve
@@ -45,20 +61,36 @@ class BridgeTable:
         """Gaps of the rows, m."""
         return np.append(self.within(np.array([0.0, 1.0 / 3.0, 2.0 / 3.0])), self.curve.rupture)
 
+    @property
+    def end_of_octaves(self) -> float:
+        """Gap at which the octaves end, m."""
+        return float(self.scale * (2.0**self.octaves - 1.0))
+
     def within(self, parts: FloatArray) -> FloatArray:
-        """Gaps at the given parts of all cells, m."""
+        """Gaps at the given parts (0 to 1) of all cells, m."""
         mantissas = (1.0 + (np.arange(self.cells)[:, None] + parts).ravel() / self.cells)[None, :]
         octaves = np.ldexp(1.0, np.arange(self.octaves))[:, None]
         near = self.scale * ((octaves * mantissas).ravel() - 1.0)
-        middle = self.scale * (2.0**self.octaves - 1.0)
+        middle = self.end_of_octaves
         even = (np.arange(2 * self.cells)[:, None] + parts).ravel() / (2 * self.cells)
         far = middle + (self.curve.rupture - middle) * (1.0 - (1.0 - even) ** 2)
         return np.concatenate([near, far])
 
     def interpolated(self, gaps: FloatArray) -> FloatArray:
-        """Forces at gaps (m), shape (n, 5), as the engine interpolates them: by a cubic through the rows of a cell."""
+        """Forces as the engine interpolates them: by a cubic through the rows of a cell.
+
+        Parameters
+        ----------
+        gaps : ndarray, shape (n,)
+            Gaps, m; those outside of the table are moved to its ends.
+
+        Returns
+        -------
+        ndarray, shape (n, 5)
+            The columns of `walkers.physics.bridge.Forces`.
+        """
         rupture = self.curve.rupture
-        middle = self.scale * (2.0**self.octaves - 1.0)
+        middle = self.end_of_octaves
         gaps = np.clip(gaps, 0.0, rupture)
         mantissa, exponent = np.frexp(1.0 + gaps / self.scale)
         near = self.cells * ((exponent - 1) + 2.0 * mantissa - 1.0)
@@ -67,8 +99,8 @@ class BridgeTable:
         )
         place = np.where(gaps < middle, near, far)
         cell = np.minimum(place.astype(int), (len(self.rows) - 1) // 3 - 1)
-        # Lagrange's polynomials of the rows at 0, 1/3, 2/3 and 1 of the cell; products and sums alone
-        # have the same bits on every processor.
+        # Lagrange's polynomials of the rows at 0, 1/3, 2/3 and 1 of the cell; products and sums
+        # alone have the same bits on every processor.
         part = 3.0 * (place - cell)[:, None]
         first, second, third, fourth = (self.rows[3 * cell + number] for number in range(4))
         return np.asarray(
@@ -79,23 +111,45 @@ class BridgeTable:
         )
 
     def text(self) -> str:
-        """The text of the table in the engine's file; twelve digits, far more accurate than `TOLERANCE`."""
-        head = f"range {self.curve.formation!r} {self.curve.rupture!r} {self.scale!r} {self.octaves} {self.cells}"
+        """The text of the table in the engine's file."""
+        curve = self.curve
+        ends = f"{curve.formation!r} {curve.rupture!r}"
+        lines = [f"range {ends} {self.scale!r} {self.octaves} {self.cells}"]
         numbers = np.column_stack([self.gaps, self.rows])
-        line = " ".join(
-            ["%.12g"] * numbers.shape[1]
-        )  # a pile has millions of numbers: one format a row takes half
-        return "\n".join([head, *(line % tuple(row) for row in numbers.tolist())]) + "\n"
+        # A pile has millions of numbers: one format for a row takes half of the time.
+        row_format = " ".join([_ROW_FORMAT] * numbers.shape[1])
+        lines += [row_format % tuple(row) for row in numbers.tolist()]
+        return "\n".join(lines) + "\n"
 
 
 @lru_cache(maxsize=4096)
 def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) -> BridgeTable:
-    """Tabulate a law as finely as the tolerance requires; raises `UnusableLawError` if that is not possible."""
+    """Tabulate a law as finely as the tolerance requires.
+
+    Parameters
+    ----------
+    law
+        The law.
+    surfaces
+        The two surfaces and the volume of their bridge.
+    tolerance
+        Largest error of the interpolation between rows, relative to the forces nearby.
+
+    Returns
+    -------
+    BridgeTable
+        The coarsest table with this tolerance.
+
+    Raises
+    ------
+    UnusableLawError
+        If the law gives unusable forces, or is not smooth enough for the finest table.
+    """
     curve = law(surfaces)
     scale = curve.scale or surfaces.roughness
     octaves = max(int(log2(1.0 + 0.5 * curve.rupture / scale)), int(curve.rupture > scale))
-    cells = _COARSEST
-    while cells <= _FINEST:
+    cells = _COARSEST_CELLS
+    while cells <= _FINEST_CELLS:
         table = BridgeTable(curve, scale, octaves, cells, np.empty(0))
         table = replace(table, rows=columns_at(curve, table.gaps))
         worst, gap = _error(table)
@@ -103,8 +157,9 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
             return table
         cells *= 2
     raise UnusableLawError(
-        f"the finest table, of {_FINEST} cells per octave, has an error of {worst:.1g} at a gap of {gap:g} m; expected "
-        f"a law that is smooth between contact, {scale:g} m and its rupture, {curve.rupture:g} m"
+        f"the finest table, of {_FINEST_CELLS} cells per octave, has an error of {worst:.1g} "
+        f"at a gap of {gap:g} m; expected a law that is smooth between contact, {scale:g} m "
+        f"and its rupture, {curve.rupture:g} m"
     )
 
 
@@ -113,9 +168,9 @@ def _error(table: BridgeTable) -> tuple[float, float]:
     gaps = table.within(np.array([1.0 / 6.0, 0.5, 5.0 / 6.0]))
     exact = columns_at(table.curve, gaps)
     error = np.abs(table.interpolated(gaps) - exact)
-    # Errors are relative to forces nearby: forces fall by orders of magnitude, and some end at zero.
-    nearer = np.abs(exact[np.searchsorted(gaps, 0.5 * gaps)])
-    size = np.maximum(np.maximum(nearer, np.abs(exact)), 1e-3 * np.abs(table.rows[:1]))
+    # Errors are relative to forces nearby: forces fall by orders of magnitude, some to zero.
+    at_half_gap = np.abs(exact[np.searchsorted(gaps, 0.5 * gaps)])
+    size = np.maximum(np.maximum(at_half_gap, np.abs(exact)), 1e-3 * np.abs(table.rows[:1]))
     relative = np.divide(error, size, out=np.zeros_like(error), where=size > 0.0).max(axis=1)
     worst = int(relative.argmax())
     return float(relative[worst]), float(gaps[worst])
@@ -124,42 +179,103 @@ def _error(table: BridgeTable) -> tuple[float, float]:
 def bridge_tables(
     surfaces: Sequence[Surface], sizes: Collection[tuple[int, float]], law: BridgeLaw | None = None
 ) -> str:
-    """The bridge tables of a deck: one for every two surfaces that may meet (beads of different types never meet).
+    """The bridge tables of a deck: one for every two surfaces that may meet.
 
-    The surfaces have the contact and the liquid of each atom type of beads, the sizes atom type and radius (m) of the
-    beads; without a law, each liquid has its own.
+    Beads of different types never meet.
+
+    Parameters
+    ----------
+    surfaces
+        Contact parameters and liquid of each atom type of beads.
+    sizes
+        Atom type (from 1) and radius (m) of the beads.
+    law
+        The law of all bridges; None: that of each liquid.
+
+    Returns
+    -------
+    str
+        The text of the engine's file (``engine/table.h``).
+
+    Raises
+    ------
+    ValueError
+        If there is no such law, or it cannot be tabulated (`UnusableLawError`).
     """
     parts = [
-        "# Gap (m), pull (N), resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s).\n"
+        "# Gap (m), pull (N), resistances: normal, sliding (N s/m), coupling (N s), "
+        "rolling (N m s).\n"
     ]
-    for kind, (contact, liquid) in enumerate(surfaces, 1):
-        radii = sorted(radius for of, radius in sizes if of == kind)
-        for number, radius in enumerate(radii):
-            for other_kind, other_radius in [
-                (len(surfaces) + 1, inf),
-                *((kind, size) for size in radii[number:]),
-            ]:
-                for meeting in Surfaces.between(radius, other_radius, liquid, contact.roughness).volumes:
-                    parts.append(
-                        f'# law "{liquid.law}"\nbridge {kind} {other_kind} {radius!r} {other_radius!r}\n'
-                    )
-                    if liquid.conserved:
-                        numbers = " ".join(map(repr, (meeting.volume, *chain(*meeting.films))))
-                        parts.append(f"liquid {numbers}\n")
-                    tolerance = _COARSE if liquid.conserved else TOLERANCE
-                    parts.append(_table_text(law or by_name(liquid.law), meeting, tolerance))
+    wall_type = len(surfaces) + 1
+    for bead_type, surface in enumerate(surfaces, 1):
+        radii = sorted(radius for atom_type, radius in sizes if atom_type == bead_type)
+        for place, radius in enumerate(radii):
+            parts += _tables_of_pair(surface, (bead_type, wall_type), (radius, inf), law)
+            for other_radius in radii[place:]:
+                types = (bead_type, bead_type)
+                parts += _tables_of_pair(surface, types, (radius, other_radius), law)
     return "".join(parts)
+
+
+def _tables_of_pair(
+    surface: Surface,
+    types: tuple[int, int],
+    radii: tuple[float, float],
+    law: BridgeLaw | None,
+) -> list[str]:
+    """Lines of the tables of two surfaces, one table for each volume that their bridge may have.
+
+    Parameters
+    ----------
+    surface
+        Contact parameters and liquid of both.
+    types
+        Atom types of the two.
+    radii
+        Radii of the two, m; that of a wall is infinite.
+    law
+        The law; None: that of the liquid.
+    """
+    contact, liquid = surface
+    law = law or by_name(liquid.law)
+    tolerance = _COARSE_TOLERANCE if liquid.conserved else TOLERANCE
+    first_type, second_type = types
+    first_radius, second_radius = radii
+    bridge = f"bridge {first_type} {second_type} {first_radius!r} {second_radius!r}"
+    lines = []
+    meeting = Surfaces.between(first_radius, second_radius, liquid, contact.roughness)
+    for with_volume in meeting.volumes:
+        lines.append(f'# law "{liquid.law}"\n{bridge}\n')
+        if liquid.conserved:
+            lines.append(_liquid_line(with_volume))
+        lines.append(_table_text(law, with_volume, tolerance))
+    return lines
+
+
+def _liquid_line(surfaces: Surfaces) -> str:
+    """The line with the volume of a bridge, and shares and films of its surfaces, all in m³."""
+    shares, films = surfaces.films
+    numbers = [surfaces.volume, *shares, *films]
+    return f"liquid {' '.join([repr(number) for number in numbers])}\n"
 
 
 @lru_cache(maxsize=256)
 def _table_text(law: BridgeLaw, surfaces: Surfaces, tolerance: float) -> str:
-    """The text of the table of a law for two surfaces; a deck and the manifest of its run need it."""
+    """The text of the table of a law for two surfaces, which deck and manifest of a run need."""
     return tabulated(law, surfaces, tolerance).text()
 
 
 @dataclass(frozen=True)
 class RecordedLaw:
-    """A user's law as a run has recorded it: tables for its radii, interpolated as by the engine, and its file."""
+    """A user's law as a run has recorded it; the user's file is not executed.
+
+    Attributes
+    ----------
+    tables
+        Text of the tables for the radii of the run, which are interpolated as by the engine.
+    source
+        Contents of the file of the law; None if the run has no copy.
+    """
 
     tables: str
     source: bytes | None
@@ -167,25 +283,38 @@ class RecordedLaw:
     @property
     def sha256(self) -> str | None:
         """SHA-256 of the file of the law."""
-        return hashlib.sha256(self.source).hexdigest() if self.source is not None else None
+        if self.source is None:
+            return None
+        return hashlib.sha256(self.source).hexdigest()
 
     def __call__(self, surfaces: Surfaces) -> Curve:
         """The curve of two surfaces; raises `UnusableLawError` if the run has no such bridge."""
-        for part in self.tables.split("\nbridge ")[1:]:
-            head, text = part.split("\nrange ")
-            if [float(word) for word in head.split()[2:4]] == [
-                surfaces.radius,
-                surfaces.other_radius,
-            ]:
-                return _recorded(text)
+        for table in self.tables.split("\nbridge ")[1:]:
+            head, text = table.split("\nrange ")
+            radii = [float(word) for word in head.split()[2:4]]
+            if radii == [surfaces.radius, surfaces.other_radius]:
+                return _recorded_curve(text)
         raise UnusableLawError("the run has recorded no bridge between surfaces of these radii")
 
 
 @lru_cache(maxsize=256)
-def _recorded(text: str) -> Curve:
+def _recorded_curve(text: str) -> Curve:
+    """The curve that a table of the engine's file describes, from the text after ``range``."""
     head, *lines = text.partition("\n#")[0].splitlines()
-    formation, rupture, scale, octaves, cells = map(float, head.split())
-    rows = np.array([[float(word) for word in line.split()] for line in lines])
-    curve = Curve(lambda gaps: Forces(*table.interpolated(gaps).T), rupture, formation, scale)
-    table = BridgeTable(curve, scale, int(octaves), int(cells), rows[:, 1:])
+    formation, rupture, scale, octaves, cells = _numbers_in(head)
+    rows = np.array([_numbers_in(line) for line in lines])
+
+    def forces(gaps: FloatArray) -> Forces:
+        """Forces at gaps (m), interpolated in the table that is made below."""
+        return Forces(*table.interpolated(gaps).T)
+
+    curve = Curve(forces, rupture, formation, scale)
+    table = BridgeTable(
+        curve=curve, scale=scale, octaves=int(octaves), cells=int(cells), rows=rows[:, 1:]
+    )
     return curve
+
+
+def _numbers_in(line: str) -> list[float]:
+    """The numbers of a line."""
+    return [float(word) for word in line.split()]
