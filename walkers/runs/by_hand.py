@@ -39,7 +39,8 @@ from walkers.runner.manifest import (
 )
 from walkers.runs.case_text import quantity_kind
 from walkers.templates import deck as decks
-from walkers.templates.deck import PRINTED, Segment, suffixes
+from walkers.templates.deck import Segment
+from walkers.templates.parameters import PRINTED, suffixes
 
 _LOGS = (decks.OUTPUT_NAME, "log.liggghts")
 """Output of the engine by `write_run_script`, and the default log of LIGGGHTS."""

@@ -1,0 +1,258 @@
+"""Named parameters of a deck: lines that a user may edit, and formulas that follow from them.
+
+LIGGGHTS replaces ``${name}`` by the text of a ``string`` variable, and computes ``$(formula)`` in
+double precision to 20 digits. A deck with names therefore gives the same results bit for bit as one
+with numbers. A variable of the style ``equal`` would be inserted with 15 digits.
+
+``blocks/parameters.lig.j2`` prints the parameters; the other blocks use them by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+
+from walkers.arrays import Vector
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.materials import Contact
+from walkers.physics.capillary import BridgeLiquid
+
+PRINTED = "parameters:"
+"""Start of the line in which the engine prints the parameters."""
+STATUS_LINES_PER_CYCLE = 4
+"""Lines of the engine's log in each cycle of the drive."""
+_COMMENT_COLUMN = 55
+"""Width of a parameter and its value, in letters; its comment follows."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A ``string`` variable of a deck.
+
+    Attributes
+    ----------
+    name
+        Name of the variable.
+    value
+        Its text: a number, or a formula ``$(…)`` of earlier variables.
+    unit
+        SI unit of the number; empty: none.
+    note
+        What a reader of the deck should know about it; may be empty.
+    """
+
+    name: str
+    value: str
+    unit: str = ""
+    note: str = ""
+
+    @property
+    def line(self) -> str:
+        """The line of the deck that sets the variable, with unit and note as a comment."""
+        command = f"variable        {self.name} string {self.value}"
+        comment = ": ".join(text for text in (self.unit, self.note) if text)
+        if not comment:
+            return command
+        return f"{command.ljust(_COMMENT_COLUMN)} # {comment}"
+
+
+def number_text(value: float) -> str:
+    """A number as the shortest text that reads back as the same double."""
+    return repr(float(value))
+
+
+def suffixes(count: int) -> list[str]:
+    """Suffixes for the names of several parameters of one kind; empty for a single parameter."""
+    if count == 1:
+        return [""]
+    return [f"_{place}" for place in range(1, count + 1)]
+
+
+def in_cycles(steps: int, steps_per_cycle: int) -> str:
+    """Steps as a multiple or a part of a cycle, a formula; as a number if they are neither."""
+    cycles, remainder = divmod(steps, steps_per_cycle)
+    if cycles == 1 and not remainder:
+        return "${steps_per_cycle}"
+    if cycles and not remainder:
+        return f"$({cycles}*v_steps_per_cycle)"
+    for parts in (steps_per_cycle // steps, STATUS_LINES_PER_CYCLE):
+        if parts and ceil(steps_per_cycle / parts) == steps:
+            if steps_per_cycle % parts:
+                return f"$(ceil(v_steps_per_cycle/{parts}))"
+            return f"$(v_steps_per_cycle/{parts})"
+    return str(steps)
+
+
+def vector_along(name: str, direction: Vector) -> str:
+    """The three components of a parameter times a unit vector, as formulas."""
+    components = []
+    for component in direction:
+        if component == 1.0:
+            components.append(f"${{{name}}}")
+        elif component == 0.0:
+            components.append("0.0")
+        else:
+            components.append(f"$(v_{name}*({number_text(component)}))")
+    return " ".join(components)
+
+
+# --- parameters that a user may edit --------------------------------------------------------------
+
+
+def drive_parameters(case: Case, *, shaken: bool) -> list[Parameter]:
+    """Frequencies, accelerations and phases of the harmonics, and the frequency of the cycle.
+
+    Parameters
+    ----------
+    case
+        The case of the deck.
+    shaken
+        Whether the walls move in this deck; without, only frequencies are needed.
+    """
+    harmonics = case.excitation.harmonics
+    endings = suffixes(len(harmonics))
+    parameters = []
+    for harmonic, ending in zip(harmonics, endings, strict=True):
+        frequency = number_text(harmonic.frequency)
+        parameters.append(Parameter(f"frequency{ending}", frequency, "Hz"))
+        if shaken:
+            acceleration = number_text(harmonic.peak_acceleration)
+            parameters.append(Parameter(f"peak_acceleration{ending}", acceleration, "m/s^2"))
+        if len(harmonics) > 1 or harmonic.phase:
+            parameters.append(Parameter(f"phase{ending}", number_text(harmonic.phase), "rad"))
+    if len(harmonics) != 1:
+        note = "of a cycle"
+        if harmonics:
+            note += ", the common period of all: to be changed with them"
+        frequency = number_text(case.excitation.frequency)
+        parameters.append(Parameter("cycle_frequency", frequency, "Hz", note))
+    return parameters
+
+
+def length_parameters(
+    case: Case, stable_step: float, rest_steps: int | None, drive_steps: int | None
+) -> list[Parameter]:
+    """Steps of a cycle, steps of rest and cycles of a deck.
+
+    Parameters
+    ----------
+    case
+        The case of the deck.
+    stable_step
+        Lowest limit of the time step, s.
+    rest_steps
+        Steps before the drive begins; None if it begins in another deck of the run.
+    drive_steps
+        Steps from the start of the drive to the end of the deck; None as for ``rest_steps``.
+    """
+    run = case.run
+    note = f"a multiple of {run.samples_per_cycle} for which the time step is below "
+    note += f"{stable_step:.3g} s"
+    parameters = [Parameter("steps_per_cycle", str(run.steps_per_cycle), note=note)]
+    if rest_steps:
+        note = "before the drive, in which the beads come to rest"
+        parameters.append(Parameter("rest_steps", str(rest_steps), note=note))
+    if drive_steps is not None and drive_steps % run.steps_per_cycle == 0:
+        note = "of the drive"
+        if run.continuation:
+            note += f"; {run.continuation}"
+        parameters.append(Parameter("cycles", str(drive_steps // run.steps_per_cycle), note=note))
+    return parameters
+
+
+def material_parameters(
+    case: Case,
+    contacts: Sequence[Contact],
+    scalable_liquid: BridgeLiquid | None,
+    *,
+    with_density: bool,
+) -> list[Parameter]:
+    """Gravity and the materials, as far as they are the same for all beads.
+
+    Parameters
+    ----------
+    case
+        The case of the deck.
+    contacts
+        Contact parameters of the surfaces of its beads.
+    scalable_liquid
+        The liquid, if the resistances of its bridges are proportional to its viscosity; else None.
+    with_density
+        Whether the deck sets the density of beads; a deck that continues a run does not.
+    """
+    parameters = []
+    if case.environment.gravity > 0:
+        parameters.append(Parameter("gravity", number_text(case.environment.gravity), "m/s^2"))
+    if with_density:
+        density = number_text(case.beads.density)
+        parameters.append(Parameter("density", density, "kg/m^3", "of the beads"))
+    moduli = {contact.youngs_modulus for contact in (*contacts, case.contact)}
+    if len(moduli) == 1:
+        modulus = number_text(contacts[0].youngs_modulus)
+        note = "softer than the material, for a longer time step; "
+        note += "walkers run --accuracy measures its error"
+        parameters.append(Parameter("youngs_modulus", modulus, "Pa", note))
+    parameters.append(Parameter("poissons_ratio", number_text(case.contact.poissons_ratio)))
+    if len(contacts) == 1:
+        parameters += _contact_parameters(contacts[0])
+    if scalable_liquid is not None:
+        viscosity = number_text(scalable_liquid.viscosity)
+        parameters.append(Parameter("viscosity", viscosity, "Pa s", "of the bridges"))
+    return parameters
+
+
+def _contact_parameters(contact: Contact) -> list[Parameter]:
+    """Restitution and the coefficients of friction of a deck with one surface of beads."""
+    keys = ["restitution", "friction.bead_bead", "friction.bead_wall"]
+    if contact.rolling_friction > 0:
+        keys.append("rolling_friction")
+    parameters = []
+    for key in keys:
+        value = contact.value_of(key)
+        parameters.append(Parameter(key.replace(".", "_"), number_text(value)))
+    return parameters
+
+
+# --- parameters that follow from others -----------------------------------------------------------
+
+
+def derived_parameters(
+    case: Case, *, shaken: bool, start_velocity: Sequence[float]
+) -> list[Parameter]:
+    """Amplitudes and velocities of the walls, and the time step, as formulas.
+
+    Parameters
+    ----------
+    case
+        The case of the deck.
+    shaken
+        Whether the walls move in this deck.
+    start_velocity
+        Velocity of the walls at the start of the drive as numbers, m/s; empty if it is zero or that
+        of the sine, which has a name here.
+    """
+    velocity_has_name = case.drive.frame == "lab" and not start_velocity
+    endings = suffixes(len(case.excitation.harmonics)) if shaken else []
+    parameters = []
+    for ending in endings:
+        acceleration = f"v_peak_acceleration{ending}"
+        angular_frequency = f"(2.0*PI*v_frequency{ending})"
+        amplitude = f"$({acceleration}/{angular_frequency}^2)"
+        parameters.append(Parameter(f"amplitude{ending}", amplitude, "m", "of the displacement"))
+        if velocity_has_name:
+            velocity = f"$({acceleration}/{angular_frequency})"
+            parameters.append(Parameter(f"peak_velocity{ending}", velocity, "m/s", "of the walls"))
+    parameters.append(Parameter("time_step", _time_step_text(case), "s"))
+    return parameters
+
+
+def _time_step_text(case: Case) -> str:
+    """The time step as a formula, if that gives the same double; else as a number of seconds."""
+    time_step = case.run.time_step
+    if 1.0 / (case.excitation.frequency * case.run.steps_per_cycle) != time_step:
+        return number_text(time_step)
+    frequency = "cycle_frequency"
+    if len(case.excitation.harmonics) == 1:
+        frequency = "frequency"
+    return f"$(1.0/(v_{frequency}*v_steps_per_cycle))"
