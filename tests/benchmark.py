@@ -22,7 +22,7 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.tables.case import Case
 from walkers.runner.binary import find_engine
 from walkers.runner.compiled_model import plugin_of
-from walkers.runner.launch import ALONE
+from walkers.runner.process import ALONE
 from walkers.runner.run_directory import write_deck
 from walkers.templates import deck as deck_module
 from walkers.templates.deck import Deck, Segment, compose, plan_of

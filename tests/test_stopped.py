@@ -38,7 +38,7 @@ from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.results import measure, read_results
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import RunBusy
-from walkers.runner.launch import ALONE, _off_the_network
+from walkers.runner.process import ALONE, off_the_network
 
 HALTING = """#!/bin/sh
 if [ -n "$HALT" ]; then
@@ -236,7 +236,7 @@ def _reachable(program: int, folder: Path) -> set[str]:
 
 
 def test_mpirun_and_its_engines_listen_to_nobody_beyond_this_machine(in_folder: Path) -> None:
-    if not _off_the_network():
+    if not off_the_network():
         pytest.skip("mpirun listens on every address where nobody may have a network of his own")
     command = [PROGRAM, "run", "pile-ci", "--set", "run.ranks=2", "--set", "run.duration=100 s"]
     program, found = (

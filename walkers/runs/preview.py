@@ -17,7 +17,7 @@ from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
 from walkers.physics.time_step import FRACTIONS
 from walkers.rounding import counted, percent
 from walkers.runner.cost import PROGRAM_SECONDS, predicted_overhead, predicted_seconds
-from walkers.runner.launch import cores_here
+from walkers.runner.process import cores_here
 from walkers.text import aligned, printable
 
 _LOOSE_PACKING = 0.55

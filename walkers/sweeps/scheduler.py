@@ -58,7 +58,7 @@ from walkers.runner.failures import (
     OutputGone,
     ProgramDiffers,
 )
-from walkers.runner.launch import cores_here
+from walkers.runner.process import cores_here
 from walkers.runner.run_directory import is_finished, is_locked, run_place, unfinished
 from walkers.runs.making import make_runs, progress_at
 from walkers.runs.status import PointState, status_text
