@@ -1,6 +1,7 @@
 """Audits of an engine: their outcomes in the user's cache, and what they decide about runs.
 
-An audit is of a binary and of a build of the contact model. `walkers.second_engine.audit` makes it.
+An audit is valid for one binary and one build of the contact model. `walkers.second_engine.audit`
+makes it.
 """
 
 from __future__ import annotations
@@ -18,12 +19,15 @@ from walkers.runner.binary import ENGINE_VARIABLE, Engine
 from walkers.runner.compiled_model import model_sha256
 from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
 
+_OUTCOME = ("passed", "lines", "failures", "date")
+"""Entries of the outcome of an audit: whether it passed, its lines, those that failed, the date."""
+
 
 def check_audit(engine: Engine) -> None:
     """Refuse an engine whose audit failed, and warn of one without an audit.
 
-    An audit is of a binary and of a build of the contact model. Another binary or another build has none until
-    ``walkers check engine`` audits it.
+    An audit is valid for one binary and one build of the contact model. Another binary or another
+    build has none until ``walkers check engine`` audits it.
 
     Parameters
     ----------
@@ -46,37 +50,58 @@ def check_audit(engine: Engine) -> None:
     elif not audit["passed"]:
         failures = audit["failures"]
         raise AuditFailed(
-            f"{engine.path} failed its audit in {len(failures)} line(s), first: {failures[0]}; to see them and to "
-            f"audit it again: walkers check engine --engine {shlex.quote(str(engine.path))}; to run, install Debian's "
-            f"package liggghts again, or name another binary by --engine or {ENGINE_VARIABLE}"
+            f"{engine.path} failed its audit in {len(failures)} line(s), first: {failures[0]}; "
+            f"to see them and to audit it again: {_audit_command(engine)}; to run, install "
+            "Debian's package liggghts again, or name another binary by --engine or "
+            f"{ENGINE_VARIABLE}"
         )
+
+
+def _audit_command(engine: Engine) -> str:
+    """The command with which the user audits an engine."""
+    return f"walkers check engine --engine {shlex.quote(str(engine.path))}"
 
 
 @lru_cache(maxsize=8)
 def _warn_unaudited(engine: Engine) -> None:
-    """Warn of an engine without an audit. The cache makes this once in a process."""
-    command = f"walkers check engine --engine {shlex.quote(str(engine.path))}"
+    """Warn of an engine without an audit; because of the cache, only once in a process."""
     warnings.warn(
-        f"{engine.path} was never audited with its contact model: {command}",
+        f"{engine.path} was never audited with its contact model: {_audit_command(engine)}",
         UnauditedEngineWarning,
         stacklevel=4,
     )
 
 
 def read_audit(engine: str, model: str | None) -> dict[str, Any] | None:
-    """Outcome of the audit of a binary, by its hash; None without one with this contact model (its hash; None: any)."""
+    """The outcome of the audit of a binary.
+
+    Parameters
+    ----------
+    engine
+        SHA-256 of the engine (`walkers.runner.binary.Engine`).
+    model
+        SHA-256 of the contact model; None: any.
+
+    Returns
+    -------
+    dict or None
+        The entries of `_OUTCOME`; None without an audit of the engine with this contact model.
+    """
     path = cache_folder() / "audits" / f"{engine}.json"
     if not is_trusted(path):
         return None
     with suppress(OSError, ValueError, KeyError):
         record = read_json(path)
         if model in (None, record["contact_model"]):
-            return {name: record[name] for name in ("passed", "lines", "failures", "date")}
+            return {name: record[name] for name in _OUTCOME}
     return None
 
 
 def write_audit(engine: str, record: Mapping[str, Any]) -> None:
-    """Save the record of a binary in place of the one before. Raises `OSError` if the cache cannot be written."""
+    """Save the record of the audit of a binary, by the binary's SHA-256, in place of the last one.
+
+    Raises `OSError` if the cache cannot be written.
+    """
     path = make_cache_folder("audits") / f"{engine}.json"
     write_json(path, record)
-    path.chmod(0o644)  # whatever the umask: a record that others can write is not believed
+    path.chmod(0o644)  # for any umask: a record that others can write is not believed

@@ -1,15 +1,22 @@
 """Failures of runs.
 
-The engine reports errors unreliably (an ERROR line without an exit status, an exit status without a line, silence).
-Failures are therefore detected from its output, mostly in `walkers.runner.launch`.
+The engine reports errors unreliably (an ERROR line without an exit status, an exit status without a
+line, silence). Failures are therefore detected from its output, mostly in `walkers.runner.launch`.
 """
 
 from __future__ import annotations
 
 import resource
 from pathlib import Path
+from typing import ClassVar, Literal
 
 from walkers.errors import WalkersError
+
+Affected = Literal["", "every point", "all at first", "one point"]
+"""Which points of a sweep a failure affects.
+
+Every point; all at first, until a point is finished; one point; or empty if this is not certain.
+"""
 
 AUDITED_VERSION = "LIGGGHTS-PUBLIC 3.8.0"
 """The audited version of the engine, for which the contact model is written."""
@@ -27,13 +34,11 @@ class EngineFailure(WalkersError):
     lost
         Number of beads that left the simulation box.
 
-    Notes
-    -----
-    ``affects`` tells which points of a sweep such a failure affects: every point; all at first, until a point is finished; one
-    point; or empty if this is not certain.
+    affects
+        Which points of a sweep such a failure affects; the same for all failures of a class.
     """
 
-    affects = ""
+    affects: ClassVar[Affected] = ""
 
     def __init__(self, message: str, directory: Path | None = None, *, lost: int = 0) -> None:
         self.message = message
@@ -41,8 +46,8 @@ class EngineFailure(WalkersError):
         self.lost = lost
         super().__init__(f"{message} (see {directory})" if directory else message)
 
-    def __init_subclass__(cls, affects: str = "") -> None:
-        """Mark a class and the classes that derive from it."""
+    def __init_subclass__(cls, affects: Affected = "") -> None:
+        """Note what the failures of a class, and of the classes that derive from it, affect."""
         cls.affects = affects or cls.affects
 
 
@@ -54,15 +59,17 @@ class OtherEngine(EngineFailure, affects="every point"):
     """The contact model was written for another version of the engine."""
 
     def __init__(self, path: Path, version: str) -> None:
-        needed = f"decks need a contact model that is written for {AUDITED_VERSION}, as Debian packages it"
-        super().__init__(f"{path} is {version}: {needed}")
+        super().__init__(
+            f"{path} is {version}: decks need a contact model that is written for "
+            f"{AUDITED_VERSION}, as Debian packages it"
+        )
 
 
 class ContactModelMissing(EngineFailure, affects="every point"):
     """The contact model cannot be compiled. Detected before the engine starts."""
 
-    def __init__(self, why: str) -> None:
-        super().__init__(f"no contact model for the engine: {why}")
+    def __init__(self, reason: str) -> None:
+        super().__init__(f"no contact model for the engine: {reason}")
 
 
 class EngineDiffers(EngineFailure, affects="every point"):
@@ -70,7 +77,10 @@ class EngineDiffers(EngineFailure, affects="every point"):
 
 
 class ProgramDiffers(EngineFailure, affects="every point"):
-    """A worker gives a run another name than the process that started the sweep: resolved cases or decks differ."""
+    """A worker gives a run another name than the process that started the sweep.
+
+    Then the resolved cases or the decks differ.
+    """
 
 
 class EngineNeverStarted(EngineFailure, affects="all at first"):
@@ -90,7 +100,7 @@ class EngineSilent(EngineFailure):
 
 
 class LogTooLong(EngineFailure):
-    """The engine's log exceeded its limit, and the engine was stopped. The log is truncated there."""
+    """The engine's log exceeded its limit, at which it is cut; the engine was stopped."""
 
 
 class MissingFrames(EngineFailure):
@@ -98,15 +108,24 @@ class MissingFrames(EngineFailure):
 
 
 class BeadsLost(EngineFailure, affects="one point"):
-    """Beads left the simulation box. Detected from the number of atoms, which the engine prints every cycle."""
+    """Beads left the simulation box.
+
+    Detected from the number of atoms, which the engine prints several times a cycle.
+    """
 
 
 class BeadsOverTheTop(BeadsLost):
-    """Beads left the simulation box at its top: before, the bead closest to its sides was the highest one."""
+    """Beads left the simulation box at its top.
+
+    Before, the bead closest to a side of the box was closest to its top.
+    """
 
 
 class BlowUp(EngineFailure, affects="one point"):
-    """A bead is faster than the drive can make it, or its speed is NaN; usually the time step is too long."""
+    """A bead is faster than the drive can make it, or its speed is NaN.
+
+    The usual cause is a time step that is too long.
+    """
 
 
 class TimeLimitExceeded(EngineFailure, affects="one point"):
@@ -114,10 +133,15 @@ class TimeLimitExceeded(EngineFailure, affects="one point"):
 
 
 class DiskFull(EngineFailure, affects="every point"):
-    """No room for the output. Detected before the run from the known size of the dump, or while the engine writes."""
+    """The disk has no space for the output.
+
+    Detected before the run from the known size of the dump, or while the engine writes.
+    """
 
     def __init__(self, needed: int | None, free: int, directory: Path) -> None:
-        missing = "" if needed is None else f"{needed / 1e6:.3g} MB are still to be written, "
+        missing = ""
+        if needed is not None:
+            missing = f"{needed / 1e6:.3g} MB are still to be written, "
         super().__init__(f"disk full: {missing}{free / 1e6:.3g} MB are free", directory)
 
 
@@ -129,8 +153,10 @@ class FileTooLarge(EngineFailure, affects="every point"):
         if limit == resource.RLIM_INFINITY:
             text = "a file is larger than the file system allows: choose a folder on another one"
         else:
-            limit_text = f"{limit / 1e3:g} kB (ulimit -f)"
-            text = f"a file is larger than the limit of {limit_text}: raise it with ulimit -f unlimited"
+            text = (
+                f"a file is larger than the limit of {limit / 1e3:g} kB (ulimit -f): "
+                "raise it with ulimit -f unlimited"
+            )
         super().__init__(text, directory)
 
 
@@ -142,11 +168,14 @@ class OutputGone(EngineFailure, affects="every point"):
 
 
 class WalkersMet(EngineFailure, affects="one point"):
-    """Walkers of different cases in a shared deck came close to each other. Detected when the output is split."""
+    """Walkers of different cases in a shared deck came close to each other.
+
+    Detected when the output is split.
+    """
 
 
 class RunBusy(EngineFailure, affects="one point"):
-    """Another process, perhaps an engine whose launcher was killed, is writing into this run."""
+    """Another process is writing into this run, perhaps an engine whose launcher was killed."""
 
 
 class AuditFailed(EngineFailure, affects="every point"):

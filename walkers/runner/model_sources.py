@@ -1,4 +1,4 @@
-"""Sources of the contact model ``cohesion bridge``: their files, and the version of the forces that they compute."""
+"""Sources of the contact model ``cohesion bridge``: their files, and the version of its forces."""
 
 from __future__ import annotations
 
@@ -13,14 +13,21 @@ SOURCES = Path(str(files("walkers.templates.engine")))
 """Folder of the sources."""
 MODEL = "bridge.cpp"
 """The file of the contact model that is compiled; it includes the headers beside it."""
+_KINDS = ("*.cpp", "*.h", "*.map", "COPYING", "README.md")
+"""Patterns of the files from which the model is built, with its licence and its manual."""
 _FORCES_VERSION = re.compile(rb"^// FORCES_VERSION \d+$", re.MULTILINE)
-"""The line of ``bridge.cpp`` that is part of the names of runs and audits; the rest of the sources is not."""
+"""The line of ``bridge.cpp`` that is part of the names of runs and audits.
+
+The rest of the sources is not.
+"""
 
 
 def model_sources() -> list[Path]:
-    """Files from which the contact model is built, with its licence and its manual."""
-    kinds = ("*.cpp", "*.h", "*.map", "COPYING", "README.md")
-    return sorted(path for kind in kinds for path in SOURCES.glob(kind))
+    """Files from which the contact model is built, with its licence and its manual, sorted."""
+    paths: list[Path] = []
+    for kind in _KINDS:
+        paths.extend(SOURCES.glob(kind))
+    return sorted(paths)
 
 
 def compiled_sources() -> list[Path]:

@@ -1,4 +1,4 @@
-"""Software of a run: version and commit of the program, versions of Python and of required packages."""
+"""Software of a run: versions of the program, of Python and of the required packages."""
 
 from __future__ import annotations
 
@@ -13,52 +13,79 @@ from pathlib import Path
 from typing import Any
 
 PROJECT = "granular-walkers"
+"""Name of the program as a Python package."""
+_NAME_END = re.compile(r"[^\w.-]")
+"""What ends the name of a package in a requirement, such as ``numpy>=2``."""
 _PATIENCE_SECONDS = 20.0
+"""Longest time that git may take."""
 
 
 @cache
 def software() -> dict[str, Any]:
-    """Versions of the program, of Python and of the required packages, as manifests have them; looked up once.
+    """Versions of the program, of Python and of the required packages; looked up once.
 
-    ``commit`` is that of the checkout from which the program runs or was built; None if unknown.
+    Returns
+    -------
+    dict
+        Entries of a manifest. ``commit`` is that of the checkout from which the program runs or was
+        built; None if it is unknown.
     """
     try:
-        version, required = metadata.version(PROJECT), metadata.requires(PROJECT) or []
+        version = metadata.version(PROJECT)
+        requirements = metadata.requires(PROJECT) or []
     except metadata.PackageNotFoundError:
-        version, required = "not installed", []
-    needed = [re.split(r"[^\w.-]", line)[0] for line in required if "extra ==" not in line]
-    packages = {}
-    for name in needed:
-        with suppress(metadata.PackageNotFoundError):
-            packages[name] = metadata.version(name)
-    version, _, built = version.partition("+")
-    commit = commit_of(Path(__file__).resolve().parents[2]) or built.removeprefix("g") or None
+        version = "not installed"
+        requirements = []
+    version, _, built_from = version.partition("+")
+    checkout = Path(__file__).resolve().parents[2]
+    commit = commit_of(checkout) or built_from.removeprefix("g") or None
     return {
         "granular_walkers": version,
         "commit": commit,
         "python": platform.python_version(),
-        "packages": packages,
+        "packages": _versions_of(requirements),
     }
 
 
+def _versions_of(requirements: list[str]) -> dict[str, str]:
+    """Versions of the packages of requirements that are installed, without those of extras."""
+    versions = {}
+    for requirement in requirements:
+        if "extra ==" in requirement:
+            continue
+        name = _NAME_END.split(requirement)[0]
+        with suppress(metadata.PackageNotFoundError):
+            versions[name] = metadata.version(name)
+    return versions
+
+
 def commit_of(checkout: Path) -> str | None:
-    """The commit of a checkout, with ``+changes`` if tracked files differ from it; None if it is no checkout."""
+    """The commit of a checkout, with ``+changes`` if tracked files differ from it.
+
+    None if the folder is not a checkout, git is missing, or the file system does not answer.
+    """
     if not (checkout / ".git").exists():
         return None
-    # A git hook may set another repository. Nothing is written, because many processes may ask at once.
-    ours = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
+    # A git hook may set another repository.
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     command = [
         "git",
-        "--no-optional-locks",
+        "--no-optional-locks",  # nothing is written, because many processes may ask at once
         "describe",
         "--always",
         "--abbrev=40",
         "--exclude=*",
         "--dirty=+changes",
     ]
-    how: dict[str, Any] = {"cwd": checkout, "env": ours, "timeout": _PATIENCE_SECONDS, "text": True}
-    with suppress(
-        OSError, subprocess.SubprocessError
-    ):  # no git here, or a file system that does not answer
-        return str(subprocess.run(command, check=True, capture_output=True, **how).stdout).strip()
+    with suppress(OSError, subprocess.SubprocessError):
+        done = subprocess.run(
+            command,
+            check=True,
+            capture_output=True,
+            text=True,
+            cwd=checkout,
+            env=environment,
+            timeout=_PATIENCE_SECONDS,
+        )
+        return done.stdout.strip()
     return None
