@@ -164,7 +164,7 @@ def make_folder(folder: Path) -> None:
         ) from error
 
 
-# --- folders that are filled before they get their name ---------------------------------------------------------------
+# --- folders that are filled before they get their name -------------------------------------------
 
 VTK_SCRATCH = ".vtk-"
 """Start of the names of the scratch folders of exports to VTK."""

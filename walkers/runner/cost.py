@@ -147,5 +147,5 @@ def _young_laplace_bridges(cases: Iterable[Case]) -> list[Surfaces]:
 
 
 def pairs_of_beads(case: Case) -> int:
-    """Half of the number of beads of a case, rounded up: the number of dimers with the same cost."""
+    """Half the number of beads of a case, rounded up: the number of dimers with the same cost."""
     return ceil(case.count / 2)

@@ -113,8 +113,13 @@ def write_manifest(directory: Path, run: FinishedRun) -> None:
 
 
 def _engine_entries(run: FinishedRun) -> dict[str, Any]:
-    """The engine, its audit, the contact model and the bridge tables; no engine for runs by hand."""
-    engine = {"path": "", "version": run.report.version, "sha256": "", "audit": None}
+    """The engine, its audit, the contact model and the bridge tables."""
+    engine: dict[str, Any] = {
+        "path": "",
+        "version": run.report.version,
+        "sha256": "",
+        "audit": None,
+    }
     model = None
     if run.engine is not None:
         plugin = plugin_of(run.engine)
@@ -131,7 +136,7 @@ def _engine_entries(run: FinishedRun) -> dict[str, Any]:
 
 
 def _course_entries(run: FinishedRun) -> dict[str, Any]:
-    """How the run went; the entries depend on who made it: a shared deck, the user or a run alone."""
+    """How the run went; what is told depends on how it was made: shared, by hand or alone."""
     entries: dict[str, Any] = {"segments": run.segments, "drive_from": run.drive_from}
     if run.shared_deck is not None:
         entries["shared_deck"] = dict(run.shared_deck)

@@ -1,12 +1,15 @@
 """Run directories: one per run, named by the case and a hash of everything that determines the run.
 
-A run is made in ``<name>-<hash>.incomplete``. Its manifest is written last, then the directory is renamed to
-``<name>-<hash>``: a directory without a manifest is not a finished run, and a repeated run replaces the old one only
-when it has finished. Input and output of the engine are in ``segments/0000``, ``segments/0001``, …; walkers have one
-segment unless their case asks for more.
+A run is made in ``<name>-<hash>.incomplete``. Its manifest is written last, then the directory is
+renamed to ``<name>-<hash>``: a directory without a manifest is not a finished run, and a repeated
+run replaces the old one only when it has finished. Input and output of the engine are in
+``segments/0000``, ``segments/0001``, …; walkers have one segment unless their case asks for more.
 
-During the run, the file ``<name>-<hash>.lock`` is locked with ``flock``. Engines inherit the lock: an engine that
-outlives its launcher keeps other processes away from its directory until the kernel ends it, within moments.
+During the run, the file ``<name>-<hash>.lock`` is locked with ``flock``. Engines inherit the lock:
+an engine that outlives its launcher keeps other processes away from its directory until the kernel
+ends it, within moments.
+
+The steps in which a run is made are in `walkers.runs.making`.
 """
 
 from __future__ import annotations
@@ -58,23 +61,31 @@ from walkers.templates.deck import (
 from walkers.templates.layout import DeckLayout
 
 CASE_NAME = "case.json"
+"""The resolved case."""
 LAW_NAME = "law.py"
 """Copy of the file of a user's law."""
 FAILURE_NAME = "failure.json"
+"""The failure of the last attempt, in the directory of an unfinished run."""
 SEGMENTS = "segments"
+"""Folder of the segments."""
 FIRST_SEGMENT = Path(SEGMENTS) / "0000"
 SEGMENT_NAME = "segment.json"
+"""Steps and cost of a segment, in its folder."""
 DECK_RECORD_NAME = "deck.json"
 """File beside a deck to be run by hand: the case and the text of the deck as written."""
 UNFINISHED = ".incomplete"
+"""End of the name of the directory in which a run is made."""
 REPLACED = ".replaced"
+"""End of the name of a run directory while it is replaced."""
 _LONGEST_NAME = 80
+"""Largest number of letters of the name of a case in the name of its run."""
 _LOOK_SECONDS = 0.01
+"""Time between two looks at a lock."""
 _PATIENCE_SECONDS = 2.0
 """Waiting time for a lock: engines whose launcher was killed end within a fraction of a second."""
 
 
-# --- names ------------------------------------------------------------------------------------------------------------
+# --- names ----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -94,9 +105,20 @@ class ByHand:
 
 
 def run_place(case: Case, engine: Engine, out: Path) -> Path:
-    """The final directory of a run: name of the case, and 12 hex digits of a hash of case, engine and version of decks.
+    """The final directory of a run.
 
-    The text of the deck is not hashed (a comment in a template renames no runs); the file of a user's law is.
+    Its name is that of the case, and 12 hexadecimal digits of a hash of the case, the engine, the
+    file of a user's law, and the versions of decks and run directories. The text of the deck is not
+    hashed: a comment in a template renames no runs.
+
+    Parameters
+    ----------
+    case
+        The case.
+    engine
+        The engine.
+    out
+        The folder of runs.
     """
     determinants = {
         "case": case.determinants(),
@@ -104,129 +126,166 @@ def run_place(case: Case, engine: Engine, out: Path) -> Path:
         "engine": engine.sha256,
         "format": FORMAT,
     }
-    if (
-        law_sha256 := case.recorded_law.sha256
-        if case.recorded_law
-        else source_sha256(case.liquid.law)
-    ):
+    law_sha256 = _sha256_of_law(case)
+    if law_sha256:
         determinants["law"] = law_sha256
     text = json.dumps(determinants, sort_keys=True, separators=(",", ":"))
-    return (
-        out
-        / f"{name_of(case.name)}-{hashlib.sha256(text.encode('utf-8', 'surrogateescape')).hexdigest()[:12]}"
-    )
+    digest = hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
+    return out / f"{name_of(case.name)}-{digest[:12]}"
+
+
+def _sha256_of_law(case: Case) -> str | None:
+    """SHA-256 of the file of a user's law; None for a built-in law."""
+    if case.recorded_law:
+        return str(case.recorded_law.sha256) if case.recorded_law.sha256 else None
+    return source_sha256(case.liquid.law)
 
 
 def name_of(case_name: str) -> str:
-    """The name of a case at the beginning of the name of a run."""
+    """The name of a case as the names of its runs begin: without spaces and odd letters."""
     return re.sub(r"[^\w.+-]+", "_", case_name)[:_LONGEST_NAME]
 
 
 def is_run_name(name: str) -> bool:
-    """Whether a run directory may have a name: it ends in twelve hex digits."""
+    """Whether a name can be that of a run directory: it ends in twelve hexadecimal digits."""
     return re.fullmatch(r".+-[0-9a-f]{12}", name) is not None
 
 
 def unfinished(place: Path) -> Path:
-    """The directory in which the run of a place is made."""
+    """The directory in which a run is made, for its final directory."""
     return place.with_name(place.name + UNFINISHED)
 
 
 def holds_unfinished(directory: Path) -> bool:
-    """Whether a directory has an unfinished run: it contains a case, or only files that are written earlier."""
+    """Whether a directory has an unfinished run.
+
+    It contains a case, or nothing but files that are written earlier.
+    """
     try:
         names = {path.name for path in directory.iterdir()}
     except OSError:  # unreadable
         return False
-    return CASE_NAME in names or all(
-        name in (SEGMENTS, FAILURE_NAME) or name.startswith(".case.") for name in names
-    )
+    return CASE_NAME in names or all(_is_written_before_case(name) for name in names)
 
 
-# --- reading ----------------------------------------------------------------------------------------------------------
+def _is_written_before_case(name: str) -> bool:
+    """Whether a file may exist before the case does; ``.case.…`` is a part of the case."""
+    return name in (SEGMENTS, FAILURE_NAME) or name.startswith(".case.")
+
+
+# --- reading --------------------------------------------------------------------------------------
 
 
 def case_of(directory: Path) -> Case:
-    """The resolved case of a run directory; raises `OSError` or `ValueError` if it is unreadable or was changed."""
-    file = (directory / CASE_NAME).stat()
-    return with_recorded_law(
-        _case_in(directory.resolve(), file.st_ino, file.st_mtime_ns, file.st_size), directory
-    )
+    """The resolved case of a run directory.
+
+    Raises
+    ------
+    OSError, ValueError
+        If the case is unreadable, or its file has changed (`FileChanged`).
+    """
+    status = (directory / CASE_NAME).stat()
+    identity = (status.st_ino, status.st_mtime_ns, status.st_size)
+    case = _case_in(directory.resolve(), identity)
+    return with_recorded_law(case, directory)
 
 
 @lru_cache(maxsize=4)
-def _case_in(directory: Path, *_file: int) -> Case:
-    """The case in a file, which is read once as long as the file stays the same."""
+def _case_in(directory: Path, _identity: tuple[int, ...]) -> Case:
+    """The case of a directory, which is read once as long as its file stays the same."""
     check_unchanged(directory, [CASE_NAME])
     return stored_case(read_json(directory / CASE_NAME))
 
 
 def with_recorded_law(case: Case, directory: Path) -> Case:
-    """A case with the bridges of a user's law as a directory has recorded them; the user's file is not executed."""
+    """A case with the bridges of a user's law as a run directory has recorded them.
+
+    The user's file is not executed. Cases with a built-in law stay as they are.
+    """
     if case.liquid.law in LAWS:
         return case
     from walkers.templates.bridge_tables import RecordedLaw
 
-    places = (directory, *segment_directories(directory))
-    tables = next(
-        (place / BRIDGES_NAME for place in places if (place / BRIDGES_NAME).is_file()), None
-    )
-    source = directory / LAW_NAME if (directory / LAW_NAME).is_file() else None
-    files = [file for file in (tables, source) if file]
-    check_unchanged(directory, [file.relative_to(directory).as_posix() for file in files])
-    law = RecordedLaw(
-        tables.read_text("utf-8") if tables else "", source.read_bytes() if source else None
-    )
-    return case.with_values(recorded_law=law)
+    tables = ""
+    for place in (directory, *segment_directories(directory)):
+        file = place / BRIDGES_NAME
+        if file.is_file():
+            check_unchanged(directory, [file.relative_to(directory).as_posix()])
+            tables = file.read_text("utf-8")
+            break
+    source = None
+    if (directory / LAW_NAME).is_file():
+        check_unchanged(directory, [LAW_NAME])
+        source = (directory / LAW_NAME).read_bytes()
+    return case.with_values(recorded_law=RecordedLaw(tables, source))
 
 
 def write_case(directory: Path, case: Case) -> None:
-    """Write the resolved case of a run, and of a user's law its file and the tables of its bridges."""
+    """Write the resolved case of a run; for a user's law also its file and its bridge tables."""
     write_json(directory / CASE_NAME, case.as_dict(), sync=False)
     if case.liquid.law in LAWS:
         return
-    tables = bridge_tables_of(
-        case, [(case.contact, case.liquid.of_bridges)], {(1, radius) for radius in case.radii}
-    )
+    surface = (case.contact, case.liquid.of_bridges)
+    tables = bridge_tables_of(case, [surface], {(1, radius) for radius in case.radii})
     write_bytes(directory / BRIDGES_NAME, tables.encode("utf-8"), sync=False)
-    file = None if case.recorded_law else source_of(case.liquid.law)
-    if (
-        source := file.read_bytes() if file else getattr(case.recorded_law, "source", None)
-    ) is not None:
+    source = _source_of_law(case)
+    if source is not None:
         write_bytes(directory / LAW_NAME, source, sync=False)
 
 
+def _source_of_law(case: Case) -> bytes | None:
+    """Contents of the file of a user's law; None if the law was recorded without its file."""
+    if case.recorded_law:
+        source: bytes | None = getattr(case.recorded_law, "source", None)
+        return source
+    file = source_of(case.liquid.law)
+    return file.read_bytes() if file else None
+
+
 def read_layout(segment: Path) -> DeckLayout:
-    """Layout of the dumps of a segment; raises `OSError`, `ValueError`, `KeyError` or `TypeError` if unreadable."""
+    """Layout of the dumps of a segment.
+
+    Raises `OSError`, `ValueError`, `KeyError` or `TypeError` if it is unreadable.
+    """
     return DeckLayout(**read_json(segment / LAYOUT_NAME))
 
 
 def segment_directories(directory: Path) -> list[Path]:
-    """The complete segments of a run, in order; for a deck that was run by hand, the directory itself."""
+    """The complete segments of a run, in order.
+
+    For a deck that was run by hand, that is the directory itself. Segments that are not complete
+    have a suffix.
+    """
     segments = sorted(path for path in (directory / SEGMENTS).glob("[0-9]*") if not path.suffix)
-    return segments or ([directory] if (directory / SEGMENT_NAME).is_file() else [])
+    if not segments and (directory / SEGMENT_NAME).is_file():
+        return [directory]
+    return segments
 
 
 def run_of_segment(segment: Path) -> Path:
-    """The run directory of a segment."""
-    return segment.parent.parent if segment.parent.name == SEGMENTS else segment
+    """The run directory of a segment; of a deck that was run by hand, the directory itself."""
+    if segment.parent.name == SEGMENTS:
+        return segment.parent.parent
+    return segment
 
 
 def files_of_segments(directory: Path) -> list[str]:
     """Input and output files of the engine for a run, as paths within its directory."""
     segments = segment_directories(directory)
-    dumps = {name for segment in segments[:1] for name in read_layout(segment).dumps}
-    files = [path for segment in segments for path in segment.iterdir() if path.is_file()]
-    by_hand = [directory] == segments  # with tables and pictures beside
-    return [
-        path.relative_to(directory).as_posix()
-        for path in files
-        if not by_hand or path.name in dumps
-    ]
+    if segments == [directory]:  # run by hand: tables and pictures are in the same folder
+        return [name for name in read_layout(directory).dumps if (directory / name).is_file()]
+    names = []
+    for segment in segments:
+        files = [path for path in segment.iterdir() if path.is_file()]
+        names += [path.relative_to(directory).as_posix() for path in files]
+    return names
 
 
 def leave_out_dumps(directory: Path) -> None:
-    """Remove dumps, restart files and tables of bridges of a finished run that is locked; its manifest says so."""
+    """Remove dumps, restart files and tables of bridges of a finished run.
+
+    The run must be locked (`locked`). Its manifest lists what was left out.
+    """
     contents = read_manifest(directory)
     dumps = {*read_layout(segment_directories(directory)[0]).dumps, RESTART_NAME, BRIDGES_NAME}
     names = [name for name in contents["files"] if "/" in name and Path(name).name in dumps]
@@ -241,13 +300,27 @@ def is_deck_folder(folder: Path) -> bool:
 
 
 def is_finished(directory: Path) -> bool:
-    """Whether a directory has a finished run: it has a manifest."""
+    """Whether a directory has a finished run, that is a manifest."""
     return (directory / MANIFEST_NAME).is_file()
 
 
 def drive_from(case: Case, done: Iterable[Mapping[str, Any]]) -> int | None:
-    """Step at which the drive begins: the end of the first segment that leaves the beads at rest; None: unknown yet."""
-    settled_below, longest_settling = case.run.settled_below, case.run.longest_settling
+    """Step at which the drive begins: the end of the first segment that leaves the beads at rest.
+
+    Parameters
+    ----------
+    case
+        The case of the run.
+    done
+        Records of its complete segments, in order.
+
+    Returns
+    -------
+    int or None
+        The step; None if the beads do not rest yet.
+    """
+    settled_below = case.run.settled_below
+    longest_settling = case.run.longest_settling
     if settled_below is None or longest_settling is None:  # the beads do not rest before the drive
         return 0
     for segment in done:
@@ -259,22 +332,34 @@ def drive_from(case: Case, done: Iterable[Mapping[str, Any]]) -> int | None:
     return None
 
 
-# --- writing ----------------------------------------------------------------------------------------------------------
+# --- writing --------------------------------------------------------------------------------------
 
 
 def write_deck(deck: Deck, directory: Path, before: Path | None = None) -> None:
-    """Write a deck, its files and its layout into a directory; files that are the same in ``before`` are linked."""
+    """Write a deck, its files and its layout into a directory.
+
+    Parameters
+    ----------
+    deck
+        The deck.
+    directory
+        The folder of the new segment.
+    before
+        The folder of the segment before, from which files with the same contents are linked; None:
+        there is none.
+    """
     for name, text in {DECK_NAME: deck.text, **deck.files}.items():
         contents = text.encode("utf-8", "surrogateescape")
-        if (
-            before is not None
-            and (before / name).is_file()
-            and (before / name).read_bytes() == contents
-        ):
+        if before is not None and _has_contents(before / name, contents):
             link_or_copy(before / name, directory / name)
         else:
             (directory / name).write_bytes(contents)
     write_json(directory / LAYOUT_NAME, deck.layout.as_dict(), sync=False)
+
+
+def _has_contents(file: Path, contents: bytes) -> bool:
+    """Whether a file exists and has these contents."""
+    return file.is_file() and file.read_bytes() == contents
 
 
 def write_segment_record(
@@ -284,7 +369,26 @@ def write_segment_record(
     rms_velocity: float | None = None,
     by_hand: ByHand | None = None,
 ) -> dict[str, Any]:
-    """Write the steps and the cost of a segment into its directory, and return this record."""
+    """Write the steps and the cost of a segment into its directory.
+
+    Parameters
+    ----------
+    directory
+        Folder of the segment.
+    segment
+        Its steps.
+    report
+        What the engine reported.
+    rms_velocity
+        Root mean square velocity of the beads at the end, m/s; None if the engine did not print it.
+    by_hand
+        What the record tells of a run by hand; None for other runs.
+
+    Returns
+    -------
+    dict
+        The record.
+    """
     record = {
         **segment._asdict(),
         **vars(report),
@@ -321,10 +425,9 @@ def write_errors_as_failures(incomplete: Path, needed: int | None = None) -> Ite
     try:
         yield
     except OSError as error:
-        # Whoever removes the directory may not have come to the end.
-        if error.errno == errno.ENOENT and Path(error.filename or "").absolute().is_relative_to(
-            incomplete.absolute()
-        ):
+        # The directory may still exist: somebody may be removing it, file by file.
+        missing = Path(error.filename or "").absolute()
+        if error.errno == errno.ENOENT and missing.is_relative_to(incomplete.absolute()):
             raise OutputGone(incomplete) from error
         if error.errno == errno.EFBIG:
             raise FileTooLarge(incomplete) from error
@@ -338,9 +441,8 @@ def move_into_place(complete: Path, place: Path) -> None:
     recover(place)
     replaced = place.with_name(place.name + REPLACED)
     if place.exists():
-        for case_file in place.glob(
-            "*.toml"
-        ):  # of an unpacked archive: it may be the file that was run
+        # The case file of an unpacked archive may be the file that was run.
+        for case_file in place.glob("*.toml"):
             if not (complete / case_file.name).exists():
                 link_or_copy(case_file, complete / case_file.name)
         place.rename(replaced)
@@ -350,7 +452,10 @@ def move_into_place(complete: Path, place: Path) -> None:
 
 
 def recover(place: Path) -> None:
-    """Undo a replacement that was interrupted between its two renames; finish one that was interrupted after them."""
+    """Mend a replacement that was interrupted.
+
+    Between its two renames it is undone, after them it is finished.
+    """
     replaced = place.with_name(place.name + REPLACED)
     if not place.exists() and replaced.exists():
         replaced.rename(place)
@@ -358,60 +463,106 @@ def recover(place: Path) -> None:
         shutil.rmtree(replaced)
 
 
-# --- locks ------------------------------------------------------------------------------------------------------------
+# --- locks ----------------------------------------------------------------------------------------
 
 
 def _lock_file(place: Path) -> Path:
+    """The file that is locked while the run of a place is made."""
     return place.with_name(f"{place.name}.lock")
 
 
 @contextmanager
 def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
-    """Lock places of runs; yield the descriptors of those that no other process keeps locked for two more seconds."""
-    ours: dict[Path, int] = {}
-    end = time.monotonic() + _PATIENCE_SECONDS
+    """Lock places of runs.
+
+    Parameters
+    ----------
+    places
+        Final directories of runs.
+
+    Yields
+    ------
+    dict
+        File descriptors of the locks by place, without the places that another process keeps locked
+        for two more seconds.
+
+    Raises
+    ------
+    InputError
+        If the file system has no locks.
+    """
+    descriptors: dict[Path, int] = {}
+    deadline = time.monotonic() + _PATIENCE_SECONDS
     try:
-        # Sorted, so that one of two processes that want the same places gets all of them, not each process a part.
+        # Sorted, so that one of two processes that lock the same places gets all of them, instead
+        # of each process a part.
         for place in sorted(set(places)):
-            if (descriptor := _lock(_lock_file(place), end)) is not None:
-                ours[place] = descriptor
-        yield ours
+            descriptor = _lock(_lock_file(place), deadline)
+            if descriptor is not None:
+                descriptors[place] = descriptor
+        yield descriptors
     finally:
-        for place, descriptor in ours.items():
+        for place, descriptor in descriptors.items():
             _lock_file(place).unlink(missing_ok=True)
             os.close(descriptor)
 
 
 @contextmanager
 def recomputed(directory: Path, names: Collection[str]) -> Iterator[None]:
-    """Record in the manifest of a finished run that the block recomputes files: program, time, checksums.
+    """Record in the manifest of a finished run that a ``with`` block recomputes files.
 
-    During the block the run is locked, and the manifest does not list the files, so that a kill gives no false alarm.
+    It records program, time and checksums. During the block the run is locked, and the manifest
+    does not list the files, so that a kill gives no false alarm.
+
+    Parameters
+    ----------
+    directory
+        The run directory; without a manifest, nothing is recorded.
+    names
+        Paths of the files within the directory.
+
+    Raises
+    ------
+    RunBusy
+        If another process has locked the run.
     """
     if not is_finished(directory):
         yield
         return
     place = directory.resolve()
-    with locked([place]) as ours:
-        if not ours:
+    with locked([place]) as descriptors:
+        if not descriptors:
             raise RunBusy("another process is measuring this run", directory)
         contents = read_manifest(directory)
         sums = sums_of(contents, directory)
-        if [name for name in names if sums.pop(name, None)]:
+        removed = [sums.pop(name, None) for name in names]
+        if any(removed):
             write_json(directory / MANIFEST_NAME, contents)
         yield
         sums |= checksums(directory, names)
-        contents.setdefault("files", {}).update(
-            {name: (directory / name).stat().st_size for name in names}
-        )
+        sizes = {name: (directory / name).stat().st_size for name in names}
+        contents.setdefault("files", {}).update(sizes)
         contents["tabulated"] = {**software(), "date": iso_time(time.time()), "files": list(names)}
         write_json(directory / MANIFEST_NAME, contents)
 
 
-def _lock(file: Path, end: float) -> int | None:
-    """Lock a file that other processes may be removing: the lock counts only if the file still has the name.
+def _lock(file: Path, deadline: float) -> int | None:
+    """Lock a file that other processes may be removing.
 
-    None if another process holds the lock until ``end``; `InputError` if the file system has no locks.
+    The lock counts only if the file still has the name. Raises `InputError` if the file system has
+    no locks.
+
+    Parameters
+    ----------
+    file
+        The file, which is made if it does not exist.
+    deadline
+        Time until which to wait, s of the monotonic clock.
+
+    Returns
+    -------
+    int or None
+        The file descriptor; None if another process holds the lock until the deadline.
     """
     while True:
         descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
@@ -421,22 +572,23 @@ def _lock(file: Path, end: float) -> int | None:
                 if os.path.samestat(os.fstat(descriptor), file.stat()):
                     return descriptor
         except BlockingIOError:
-            if time.monotonic() > end:
+            if time.monotonic() > deadline:
                 os.close(descriptor)
                 return None
             time.sleep(_LOOK_SECONDS)
         except OSError as error:
             os.close(descriptor)
             file.unlink(missing_ok=True)
-            needed = "expected a folder on a file system with locks (flock)"
-            advice = "choose another one with --out, or out= in Python"
-            message = f"files cannot be locked ({error.strerror}): {needed}; {advice}"
+            message = (
+                f"files cannot be locked ({error.strerror}): expected a folder on a file system "
+                "with locks (flock); choose another one with --out, or out= in Python"
+            )
             raise input_error(file.parent, message) from error
         os.close(descriptor)
 
 
 def is_locked(place: Path) -> bool:
-    """Whether a process is making the run of this place; on a file system without locks none can."""
+    """Whether a process is making the run of a place; on a file system without locks, none can."""
     file = _lock_file(place)
     if not file.is_file():
         return False
