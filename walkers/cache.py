@@ -1,8 +1,8 @@
-"""The program's folder in the user's cache, and numbers that are kept there because they take long to compute.
+"""The program's folder in the user's cache, and numbers there that take long to compute.
 
-What the cache contains is executed (the contact model) or believed (numbers, audits). Therefore only contents that
-nobody but the user and root can have written are used. A cache that others can write is closed, and all of its
-contents are forgotten.
+What the cache contains is executed (the contact model) or believed (numbers, audits). Therefore
+only contents are used that nobody but the user and root can have written. A cache that others can
+write is closed, and all of its contents are forgotten.
 """
 
 from __future__ import annotations
@@ -23,8 +23,10 @@ from platformdirs import user_cache_path
 
 from walkers.files import read_regular
 
-_NOWHERE = Path("/proc/no-home")  # a folder that nobody can make
+_NOWHERE = Path("/proc/no-home")
+"""A folder that nobody can make."""
 _CHECKSUM_BYTES = 32
+"""Length of the checksum before the numbers in a file."""
 _securing = threading.Lock()
 """Held while contents are forgotten, so that no thread writes what another one removes."""
 
@@ -37,14 +39,13 @@ def cache_folder() -> Path:
     """Path of the folder, without symbolic links; it may not exist, or be impossible to make."""
     try:
         return user_cache_path("granular-walkers").resolve()
-    except (
-        RuntimeError
-    ):  # neither XDG_CACHE_HOME nor HOME, and a user whom the system does not know
+    except RuntimeError:
+        # Neither XDG_CACHE_HOME nor HOME is set, and the system does not know the user.
         return _NOWHERE
 
 
 def make_cache_folder(name: str = "") -> Path:
-    """Make the folder, or a folder in it, which nobody but the user can enter.
+    """Make the folder of the cache, or a folder in it, which nobody but the user can enter.
 
     Parameters
     ----------
@@ -101,9 +102,10 @@ def secure_cache() -> None:
 
 def is_safe(path: Path) -> bool:
     """Whether only the user and root can write a file or a folder, which is not a symbolic link."""
-    about = path.lstat()
-    is_link = stat.S_ISLNK(about.st_mode)
-    return _is_ours(about) and not is_link and not about.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    status = path.lstat()
+    is_link = stat.S_ISLNK(status.st_mode)
+    others_can_write = bool(status.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
+    return _is_ours(status) and not is_link and not others_can_write
 
 
 def is_trusted(path: Path) -> bool:
@@ -119,8 +121,9 @@ def _is_safe_folder(folder: Path) -> bool:
     return _is_ours(folder.lstat()) and is_safe(folder.resolve())
 
 
-def _is_ours(about: os.stat_result) -> bool:
-    return about.st_uid in (0, os.geteuid())
+def _is_ours(status: os.stat_result) -> bool:
+    """Whether a file belongs to the user or to root."""
+    return status.st_uid in (0, os.geteuid())
 
 
 def _forget(path: Path) -> None:
@@ -137,21 +140,30 @@ def _forget(path: Path) -> None:
 
 
 def place_of_numbers(kind: str, key: bytes) -> Path:
-    """Path of the numbers of a kind that follow from ``key``; there may be none yet."""
+    """Path of numbers in the cache; the file need not exist.
+
+    Parameters
+    ----------
+    kind
+        Name of a folder in the cache.
+    key
+        All from which the numbers follow.
+    """
     return cache_folder() / kind / f"{sha256(key).hexdigest()[:24]}.bin"
 
 
 def cached_numbers(
     place: Path, compute: Callable[[], npt.NDArray[np.float64]]
 ) -> npt.NDArray[np.float64]:
-    """Numbers that are kept at a place of the cache.
+    """Numbers from the cache; if it has none, they are computed and kept there.
 
     Parameters
     ----------
     place
         Path of the numbers (`place_of_numbers`).
     compute
-        Computes the numbers if the place has none, if they are damaged, or if another user can have written them.
+        Computes the numbers; called if the place has none, if they are damaged, or if another user
+        can have written them.
 
     Returns
     -------

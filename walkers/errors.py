@@ -1,7 +1,7 @@
 """The project's errors, all under one root.
 
-A user can mend an `InputError` in a file or on the command line (exit status 2). Failures of the engine are listed in
-`walkers.runner.failures` (exit status 1).
+A user can mend an `InputError` in a file or on the command line (exit status 2). Failures of the
+engine are listed in `walkers.runner.failures` (exit status 1).
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from walkers.text import printable
 T = TypeVar("T")
 R = TypeVar("R")
 _LONGEST_VALUE = 80
-_LONGEST_TEXT = 1000  # longest quotation of a value, and of a file's name or an expectation, in a message, in letters
+"""Longest quotation of a value in a message, in letters."""
+_LONGEST_TEXT = 1000
+"""Longest quotation of a file's name or of an expectation in a message, in letters."""
 
 
 class WalkersError(Exception):
@@ -35,8 +37,14 @@ class Stopped(WalkersError):
 class Problem:
     """One error of an input.
 
-    ``key`` is dotted, such as ``drive.frequency``, and empty for the file as a whole; ``value`` as the user wrote it,
-    None where there is none to quote; ``expected`` describes right values.
+    Attributes
+    ----------
+    key
+        Dotted key, such as ``drive.frequency``; empty for the file as a whole.
+    value
+        The value as the user wrote it; None if there is none to quote.
+    expected
+        Describes right values.
     """
 
     key: str
@@ -44,15 +52,15 @@ class Problem:
     expected: str
 
     def __str__(self) -> str:
-        where = " = ".join(
-            shortened(printable(part)) for part in (self.key, self.value) if part is not None
-        )
+        place = shortened(printable(self.key))
+        if self.value is not None:
+            place += f" = {shortened(printable(self.value))}"
         expected = shortened(printable(self.expected), _LONGEST_TEXT)
-        return f"{where}: {expected}" if where else expected
+        return f"{place}: {expected}" if place else expected
 
 
 class InputError(WalkersError):
-    """An unusable input.
+    """An input that cannot be used.
 
     Attributes
     ----------
@@ -90,17 +98,19 @@ class InputErrors(InputError):
     """
 
     def __init__(self, errors: Sequence[InputError]) -> None:
-        super().__init__(
-            errors[0].source, [problem for error in errors for problem in error.problems]
-        )
+        problems: list[Problem] = []
+        for error in errors:
+            problems += error.problems
+        super().__init__(errors[0].source, problems)
         self.errors = tuple(errors)
 
     def __reduce__(self) -> tuple[type[InputErrors], tuple[Sequence[InputError]]]:
-        """How it is made again in another process."""
+        """How the error is made again in another process."""
         return InputErrors, (self.errors,)
 
     def __str__(self) -> str:
-        return "\n".join(dict.fromkeys(map(str, self.errors)))
+        texts = [str(error) for error in self.errors]
+        return "\n".join(dict.fromkeys(texts))
 
     def renamed(self, name_of: Callable[[str], str]) -> InputErrors:
         """The errors with other names of their sources."""
@@ -108,17 +118,37 @@ class InputErrors(InputError):
 
 
 def input_error(source: object, expected: str) -> InputError:
-    """An error for an unusable file, option or other source, with the expectation."""
+    """The error of an unusable file, option or other source, with what is expected."""
     return InputError(str(source), [Problem("", None, expected)])
 
 
 def key_error(key: str, expected: str, value: object = None) -> InputError:
-    """An error for an unusable value of a key; the reader adds file name and value (`walkers.inputs.messages`)."""
-    return InputError("", [Problem(key, None if value is None else quoted(value), expected)])
+    """The error of an unusable value of a key.
+
+    The reader of the file adds its name, and the value if it is None here
+    (`walkers.inputs.messages`).
+
+    Parameters
+    ----------
+    key
+        Dotted key.
+    expected
+        Describes right values.
+    value
+        The value; None: not known here.
+    """
+    quotation = None if value is None else quoted(value)
+    return InputError("", [Problem(key, quotation, expected)])
 
 
 def apply_all(function: Callable[[T], R], arguments: Iterable[T]) -> list[R]:
-    """Results of a function for several arguments; raises `InputErrors` with the problems of all of them."""
+    """Results of a function for several arguments.
+
+    Raises
+    ------
+    InputErrors
+        With the problems of all arguments, if the function raises `InputError` for some.
+    """
     results: list[R] = []
     errors: list[InputError] = []
     for argument in arguments:
@@ -132,7 +162,7 @@ def apply_all(function: Callable[[T], R], arguments: Iterable[T]) -> list[R]:
 
 
 def quoted(value: object) -> str:
-    """A value as the user may have written it, shortened."""
+    """A value as the user may have written it, shortened to `_LONGEST_VALUE` letters."""
     try:
         return shortened(json.dumps(value, ensure_ascii=False, default=str))
     except (ValueError, RecursionError):  # integers of thousands of digits, brackets without end
@@ -140,27 +170,30 @@ def quoted(value: object) -> str:
 
 
 def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
-    """A text as a message quotes it."""
-    return text if len(text) <= longest else f"{text[: longest - 3]}..."
+    """A text as a message quotes it, with at most so many letters."""
+    if len(text) <= longest:
+        return text
+    return f"{text[: longest - 3]}..."
 
 
 def check_limits(name: str, value: float | None, low: float, high: float = inf) -> None:
-    """Refuse an argument that is given and not within its limits."""
-    if value is not None and not low <= value <= high:
-        raise input_error(
-            name,
-            f"{value:g}: expected "
-            + (f"{low:g} to {high:g}" if high < inf else f"{low:g} or more"),
-        )
+    """Raise `InputError` if an argument is not within its limits; None: it was not given."""
+    if value is None or low <= value <= high:
+        return
+    limits = f"{low:g} to {high:g}" if high < inf else f"{low:g} or more"
+    raise input_error(name, f"{value:g}: expected {limits}")
 
 
 def check_utf8(word: str | Path) -> None:
-    """Refuse a path or a word that is no UTF-8, which no table or deck could name, its odd bytes written out."""
+    r"""Raise `InputError` if a path or a word is not UTF-8: no table or deck could name it.
+
+    The message has escape sequences such as ``\xff`` for its other bytes.
+    """
     try:
         str(word).encode("utf-8")
     except UnicodeEncodeError as error:
-        odd = os.fsencode(str(word)).decode("utf-8", "backslashreplace")
-        raise input_error(odd, "expected UTF-8 text") from error
+        escaped = os.fsencode(str(word)).decode("utf-8", "backslashreplace")
+        raise input_error(escaped, "expected UTF-8 text") from error
 
 
 def expected_of(word: str, names: Iterable[str]) -> str:
@@ -170,13 +203,23 @@ def expected_of(word: str, names: Iterable[str]) -> str:
 
 
 def suggestion(word: str, names: Iterable[str]) -> str:
-    """``; did you mean "…"?`` with the names that contain the word or begin it, and the most similar one; or empty."""
-    names, folded = list(names), word.casefold()
-    alike = (
-        name
-        for name in names
-        if folded in name.casefold() or folded.startswith(f"{name.casefold()} ")
-    )
-    holding = sorted(alike, key=len) if len(word) > 2 else []
-    near = dict.fromkeys([*holding, *difflib.get_close_matches(word, names, n=1, cutoff=0.6)])
-    return "; did you mean " + " or ".join(f'"{name}"' for name in near) + "?" if near else ""
+    """``; did you mean "…"?`` with the names that a user may have meant; empty if there are none.
+
+    These are names that contain the word or with which it begins, the shortest first, and the most
+    similar name.
+    """
+    names = list(names)
+    related = []
+    if len(word) > 2:
+        related = [name for name in names if _is_related(word.casefold(), name.casefold())]
+    similar = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    suggested = dict.fromkeys([*sorted(related, key=len), *similar])
+    if not suggested:
+        return ""
+    quotations = " or ".join([f'"{name}"' for name in suggested])
+    return f"; did you mean {quotations}?"
+
+
+def _is_related(word: str, name: str) -> bool:
+    """Whether a name contains a word, or is its first part; both in lower case."""
+    return word in name or word.startswith(f"{name} ")

@@ -1,6 +1,7 @@
-"""Packages that only some commands need: the extras of ``pyproject.toml``, imported where they are used.
+"""Packages that only some commands need: the extras of ``pyproject.toml``.
 
-A function that needs an extra calls `require` before it computes or writes anything.
+They are imported where they are used. A function that needs an extra calls `require` before it
+computes or writes anything.
 """
 
 from __future__ import annotations
@@ -23,36 +24,46 @@ EXTRAS = {
 
 
 class ExtraMissing(InputError):
-    """Packages of an extra that are not installed; the message says how to install them."""
+    """Packages of an extra are not installed; the message says how to install them.
+
+    Attributes
+    ----------
+    extra
+        Name of the extra.
+    missing
+        The packages that are not installed, by their names on PyPI.
+    """
 
     def __init__(self, extra: str, missing: list[str]) -> None:
         self.extra = extra
         self.missing = missing
-        how = f"make extras, or pip install 'granular-walkers[{extra}]'"
-        super().__init__(
-            EXTRAS[extra][0], [Problem("", None, f"needs {', '.join(missing)}: {how}")]
-        )
+        feature, _ = EXTRAS[extra]
+        installing = f"make extras, or pip install 'granular-walkers[{extra}]'"
+        problem = Problem("", None, f"needs {', '.join(missing)}: {installing}")
+        super().__init__(feature, [problem])
 
     def __reduce__(self) -> tuple[type[ExtraMissing], tuple[str, list[str]]]:
-        """How it is made again in another process."""
+        """How the error is made again in another process."""
         return ExtraMissing, (self.extra, self.missing)
 
     def __str__(self) -> str:
         return f"{self.source} {self.problems[0]}"
 
     def renamed(self, name_of: Callable[[str], str]) -> ExtraMissing:  # noqa: ARG002
-        """The error itself: its source is no argument."""
+        """The error itself: its source is a feature and not an argument."""
         return self
 
 
 def require(extra: str) -> None:
-    """Raise `ExtraMissing` unless the packages of an extra are installed; none of them is imported."""
-    if missing := [
-        package for package in EXTRAS[extra][1] if find_spec(module_of(package)) is None
-    ]:
+    """Raise `ExtraMissing` unless the packages of an extra are installed; imports none of them."""
+    _, packages = EXTRAS[extra]
+    missing = [package for package in packages if find_spec(module_of(package)) is None]
+    if missing:
         raise ExtraMissing(extra, missing)
 
 
 def module_of(package: str) -> str:
     """Name under which a package of `EXTRAS` is imported."""
-    return {"scikit-learn": "sklearn"}.get(package, package.replace("-", "_"))
+    if package == "scikit-learn":
+        return "sklearn"
+    return package.replace("-", "_")

@@ -1,9 +1,9 @@
 """Read and write files without waiting for them and without leaving parts of them.
 
-Whoever opens a FIFO for reading waits until somebody writes to it, and a device such as ``/dev/zero``
-never ends. The files of a run, of the cache and of an archive are regular files; anything else in
-their place is refused here. Files are written under a temporary name and renamed: readers see the old
-file or the new one, never a part.
+Whoever opens a FIFO for reading waits until somebody writes to it, and a device such as
+``/dev/zero`` never ends. The files of a run, of the cache and of an archive are regular files;
+anything else in their place is refused here. Files are written under a temporary name and renamed:
+readers see the old file or the new one, never a part.
 """
 
 from __future__ import annotations
@@ -58,18 +58,25 @@ def open_regular(path: Path) -> BufferedReader:
 
 
 def read_regular(path: Path) -> bytes:
-    """Contents of a regular file; `OSError` as by `open_regular`."""
+    """Contents of a regular file; raises `OSError` as `open_regular` does."""
     with open_regular(path) as file:
         return file.read()
 
 
 def read_limited(path: Path, most_bytes: int) -> bytes:
-    """Contents of a file that a user names, of at most so many bytes.
+    """Contents of a file that a user names.
+
+    Parameters
+    ----------
+    path
+        The file.
+    most_bytes
+        Largest size of the file, bytes.
 
     Raises
     ------
     ValueError
-        If it is no regular file, or larger; the message says which.
+        If it is not a regular file, or larger; the message tells which.
     OSError
         If it is a folder, or cannot be read.
     """
@@ -84,13 +91,22 @@ def read_limited(path: Path, most_bytes: int) -> bytes:
 
 
 def _not_regular(path: Path) -> OSError:
+    """The error of a path that is not a regular file."""
     if path.is_dir():
         return IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     return OSError(errno.EINVAL, "not a regular file", str(path))
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON object; raises `OSError` or `ValueError` if the file is unreadable or contains something else."""
+    """Read a JSON object.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be read.
+    ValueError
+        If it contains anything but a JSON object.
+    """
     contents = read_regular(path)
     try:
         value = json.loads(contents)
@@ -102,7 +118,17 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def write_json(path: Path, contents: Mapping[str, Any], *, sync: bool = True) -> None:
-    """Write a JSON object; ``sync`` is False if the whole directory is flushed to disk later."""
+    """Write a JSON object.
+
+    Parameters
+    ----------
+    path
+        The file.
+    contents
+        The object.
+    sync
+        Whether to flush the file to disk; False if the whole directory is flushed later.
+    """
     write_bytes(path, json_bytes(contents), sync=sync)
 
 
@@ -112,7 +138,7 @@ def json_bytes(contents: Mapping[str, Any]) -> bytes:
 
 
 def write_bytes(path: Path, contents: bytes, *, sync: bool = True) -> None:
-    """Write a file; see `write_json`."""
+    """Write a file; ``sync`` is as in `write_json`."""
     with replacing(path) as new, new.open("wb") as file:
         file.write(contents)
         if sync:
@@ -127,7 +153,7 @@ def checksum(path: Path) -> str:
 
 
 def link_or_copy(source: str | Path, to: str | Path) -> None:
-    """Link a file to a second place; copy it if the file system has no links."""
+    """Give a file a second path ``to``, by a hard link; copy it if the file system has no links."""
     try:
         os.link(source, to)
     except OSError:
@@ -136,17 +162,19 @@ def link_or_copy(source: str | Path, to: str | Path) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path beside a file; it is renamed to the file at the end, or removed if the block fails."""
-    # Several processes and threads may write it at once; writers of pictures and films need the suffix.
+    """Yield a temporary path beside a file for its new contents.
+
+    At the end of the ``with`` block it is renamed to the file; if the block fails, it is removed.
+    """
+    # Several processes and threads may write the file at once. Writers of pictures and films need
+    # its suffix.
     new = path.with_name(f".{path.stem}.{os.getpid()}-{threading.get_ident()}.new{path.suffix}")
     try:
         yield new
         new.replace(path)
     except BaseException as error:
-        if isinstance(error, OSError) and error.filename in (
-            None,
-            str(new),
-        ):  # errors of a full disk name no file
+        # Errors of a full disk name no file.
+        if isinstance(error, OSError) and error.filename in (None, str(new)):
             error.filename = str(path)
         with suppress(OSError):
             new.unlink(missing_ok=True)
@@ -154,14 +182,15 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder that is to contain runs, if it does not exist; `InputError` if that is not possible."""
+    """Make a folder that is to contain runs, if it does not exist; `InputError` if that fails."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        expected = "expected a folder in which files can be written"
-        raise input_error(
-            folder, f"cannot create the folder ({error.strerror}): {expected}"
-        ) from error
+        message = (
+            f"cannot create the folder ({error.strerror}): "
+            "expected a folder in which files can be written"
+        )
+        raise input_error(folder, message) from error
 
 
 # --- folders that are filled before they get their name -------------------------------------------
@@ -178,8 +207,9 @@ _FILLED_BEFORE = "vtk"
 def scratch_folder(parent: Path, prefix: str) -> Iterator[Path]:
     """Yield a new folder to be filled and renamed, and remove what is left of it at the end.
 
-    It is in a folder ``parent/PREFIX…`` that is locked with ``flock``, so that others recognise what a process that
-    was killed has left behind (`abandoned`); such folders in the same place are removed first.
+    It is in a folder ``parent/PREFIX…`` that is locked with ``flock``, so that others recognise
+    what a process that was killed has left behind (`abandoned`); such folders in the same place are
+    removed first.
 
     Parameters
     ----------
@@ -204,16 +234,16 @@ def scratch_folder(parent: Path, prefix: str) -> Iterator[Path]:
 
 def abandoned(parent: Path, prefix: str) -> list[Path]:
     """Folders of `scratch_folder` that no process fills any more."""
-    left = []
+    folders = []
     for folder in sorted(parent.glob(f"{prefix}*")):
         if folder.is_symlink() or not folder.is_dir():
             continue
         names = [path.name for path in folder.iterdir()]
-        if names not in ([_FILLED], [_FILLED_BEFORE]):  # a user's, or one that is just being made
-            continue
+        if names not in ([_FILLED], [_FILLED_BEFORE]):
+            continue  # a user's folder, or one that is just being made
         if not _is_in_use(folder):
-            left.append(folder)
-    return left
+            folders.append(folder)
+    return folders
 
 
 def _is_in_use(folder: Path) -> bool:

@@ -1,4 +1,8 @@
-"""Progress: a line that is written again in place on a terminal or in a notebook, a line now and then elsewhere."""
+"""Progress of what takes long, shown to the user.
+
+On a terminal or in a notebook it is a line that is written again in place, elsewhere a line now and
+then.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +11,14 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import NamedTuple, TextIO
 
-_BAR = 24  # letters of the bar
+_BAR_LETTERS = 24
+"""Length of the bar."""
 _FIRST_LINE_SECONDS = 1.0
+"""Time before the first line, where lines are not written in place."""
 _LONGEST_SILENCE_SECONDS = 60.0
+"""Longest time between such lines."""
 
 
 class Progress(NamedTuple):
@@ -24,7 +31,8 @@ class Progress(NamedTuple):
     text
         What is done.
     stage
-        The same in one or two words, of a run: its share in per cent, ``starting`` or ``coming to rest``.
+        The same in one or two words, of a run: its share in per cent, ``starting`` or
+        ``coming to rest``.
     """
 
     share: float
@@ -33,7 +41,10 @@ class Progress(NamedTuple):
 
 
 Tell = Callable[[Progress], None]
-"""A function that is called a few times per second; its exceptions stop what is made."""
+"""A function that is called with the progress a few times per second.
+
+Its exceptions stop what makes the progress.
+"""
 
 
 def in_notebook() -> bool:
@@ -44,35 +55,58 @@ def in_notebook() -> bool:
 
 @contextmanager
 def progress_of(name: str, shown: bool | None = True) -> Iterator[Tell | None]:
-    """Yield a function that shows the progress, or None if it is not wanted (None: it is wanted in notebooks only)."""
+    """Show the progress of a ``with`` block.
+
+    Parameters
+    ----------
+    name
+        Name of what is made, which the line begins with.
+    shown
+        Whether to show the progress; None: in notebooks only.
+
+    Yields
+    ------
+    function or None
+        Shows a `Progress`; None if the progress is not shown.
+    """
     notebook = in_notebook()
-    if not (notebook if shown is None else shown):
+    if shown is None:
+        shown = notebook
+    if not shown:
         yield None
         return
-    stream, begin, due = (
-        sys.stdout if notebook else sys.stderr,
-        time.monotonic(),
-        _FIRST_LINE_SECONDS,
-    )
-    in_place, wide = notebook or stream.isatty(), shutil.get_terminal_size().columns - 1
+    stream = sys.stdout if notebook else sys.stderr
+    if not notebook and not stream.isatty():
+        yield _show_line_by_line(name, stream)
+        return
+    width = shutil.get_terminal_size().columns - 1
+    try:
+        yield _show_in_place(name, stream, width)
+    finally:
+        print(f"\r{'':{width}}", end="\r", file=stream, flush=True)
+
+
+def _show_in_place(name: str, stream: TextIO, width: int) -> Tell:
+    """A function that writes the progress over the line before, in so many letters."""
+
+    def show(progress: Progress) -> None:
+        bar = "━" * round(_BAR_LETTERS * progress.share)
+        line = f"{name} {bar:─<{_BAR_LETTERS}} {progress.text}"
+        print(f"\r{line[:width]:{width}}", end="", file=stream, flush=True)
+
+    return show
+
+
+def _show_line_by_line(name: str, stream: TextIO) -> Tell:
+    """A function that writes a line now and then; lines become rarer with time."""
+    begin = time.monotonic()
+    due = _FIRST_LINE_SECONDS
 
     def show(progress: Progress) -> None:
         nonlocal due
         elapsed = time.monotonic() - begin
-        if in_place:
-            bar = "━" * round(_BAR * progress.share)
-            print(
-                f"\r{f'{name} {bar:─<{_BAR}} {progress.text}'[:wide]:{wide}}",
-                end="",
-                file=stream,
-                flush=True,
-            )
-        elif elapsed >= due:  # lines become rarer with time
+        if elapsed >= due:
             due = elapsed + min(elapsed, _LONGEST_SILENCE_SECONDS)
             print(f"{name}: {progress.text}", file=stream, flush=True)
 
-    try:
-        yield show
-    finally:
-        if in_place:
-            print(f"\r{'':{wide}}", end="\r", file=stream, flush=True)
+    return show

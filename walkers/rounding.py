@@ -1,11 +1,14 @@
-"""Rounding of printed numbers: at most four significant digits and the decimals of their unit, in usual units."""
+"""Rounding of printed numbers: at most four significant digits and the decimals of their unit.
+
+Numbers in JSON files and in tables keep all of their digits.
+"""
 
 from __future__ import annotations
 
 from math import degrees, floor, isfinite, log10
 
 DIGITS = 4
-"""Significant, of any number that is printed for people; JSON and tables have all of them."""
+"""Largest number of significant digits of a number that is printed for people."""
 SHOWN_UNITS = {
     "J": ("nJ", 1e9),
     "m/s": ("mm/s", 1e3),
@@ -14,21 +17,41 @@ SHOWN_UNITS = {
     "rad": ("°", degrees(1.0)),
     "share": ("%", 100.0),
 }
-"""For units of a result, those that are shown, and how many of them one is."""
+"""For a unit of a result, the unit in which it is shown, and how many of those it is."""
 _DECIMALS = {"": 9, "mm/s": 3, "mm": 6, "°": 3, "deg": 3, "%": 3, "nJ": 6}
-"""Most decimals of a number in a displayed unit: values, their differences and their scatter have the same resolution,
-and rounding errors are printed as 0."""
+"""Largest number of decimals of a number in a displayed unit.
+
+Values, their differences and their scatter have the same resolution, and rounding errors are
+printed as 0.
+"""
 _LARGEST_WRITTEN_OUT = 1e7
-_LONGER = {"d": 86400.0, "h": 3600.0, "min": 60.0}
+"""Larger numbers have an exponent."""
+_LONG_UNITS = {"d": 86400.0, "h": 3600.0, "min": 60.0}
+"""Units of time by name, s; the longest first."""
 
 
 def rounded(value: float, unit: str = "") -> str:
-    """A number as text: at most four significant digits, and the decimals of its unit; a dash for NaN.
+    """A number as text.
+
+    Parameters
+    ----------
+    value
+        The number.
+    unit
+        Its unit, one of those that are shown (`SHOWN_UNITS`).
+
+    Returns
+    -------
+    str
+        The number with at most four significant digits, and at most the decimals of its unit; a
+        dash for NaN and infinity. Integers have all of their digits.
 
     Examples
     --------
-    >>> rounded(18.18654, "mm/s"), rounded(-0.002164, "mm/s"), rounded(-3.2e-15, "mm/s"), rounded(123456.0)
-    ('18.19', '-0.002', '0', '123500')
+    >>> rounded(18.18654, "mm/s"), rounded(-0.002164, "mm/s"), rounded(-3.2e-15, "mm/s")
+    ('18.19', '-0.002', '0')
+    >>> rounded(123456.0)
+    '123500'
     """
     if isinstance(value, (bool, int)):
         return str(value)
@@ -37,11 +60,15 @@ def rounded(value: float, unit: str = "") -> str:
     if unit in _DECIMALS:
         value = round(value, _decimals(value, _DECIMALS[unit])) + 0.0  # not -0
     text = f"{value:.{DIGITS}g}"
-    return f"{float(text):.0f}" if 10**DIGITS <= abs(value) < _LARGEST_WRITTEN_OUT else text
+    if 10**DIGITS <= abs(value) < _LARGEST_WRITTEN_OUT:
+        return f"{float(text):.0f}"
+    return text
 
 
 def with_decimals(value: float, decimals: int) -> str:
-    """A number with so many decimals, fewer where it would have more than four significant digits; 0 if all are zero.
+    """A number with so many decimals; 0 if all of its digits are zero.
+
+    It has fewer decimals where it would have more than four significant digits.
 
     Examples
     --------
@@ -56,22 +83,26 @@ def with_decimals(value: float, decimals: int) -> str:
 
 
 def _decimals(value: float, most: int) -> int:
-    """Decimals of a number with at most four significant digits, so that it is rounded once."""
+    """The decimals to which a number is rounded, at most ``most``; negative for tens and hundreds.
+
+    The number then has at most four significant digits, so that it is rounded only once.
+    """
     value = float(f"{value:.{DIGITS}g}")
-    return min(most, DIGITS - 1 - (floor(log10(abs(value))) if value else 0))
+    exponent = floor(log10(abs(value))) if value else 0
+    return min(most, DIGITS - 1 - exponent)
 
 
 def counted(number: int, noun: str) -> str:
     """A number with its noun, such as ``2 runs``."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def duration_text(seconds: float) -> str:
     """A time in the largest unit that gives at least 2, such as ``3 d``."""
-    texts = (
-        f"{seconds / size:.0f} {unit}" for unit, size in _LONGER.items() if seconds >= 2 * size
-    )
-    return next(texts, f"{seconds:.0f} s")
+    for unit, size in _LONG_UNITS.items():
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds:.0f} s"
 
 
 def percent(share: float) -> str:

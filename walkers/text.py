@@ -1,9 +1,12 @@
-"""Text from templates: decks and reports with their numbers filled in."""
+"""Text from templates, such as decks and reports, and text in columns.
+
+How numbers are rounded for people is in `walkers.rounding`.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cache
 from math import isfinite
 from typing import TYPE_CHECKING, Any
@@ -13,11 +16,32 @@ if TYPE_CHECKING:
 
 
 def rendered(package: str, template: str, values: Mapping[str, Any]) -> str:
-    """The text of a template of a package, with values by the names that the template uses.
+    """The text of a template of a package.
 
-    Filters: ``number`` (shortest text that reads back as the same double) and ``numbers`` of several, ``format`` as
-    Python's for numbers, with a dash for missing ones, ``plain`` for a user's text in Markdown.
-    `jinja2.UndefinedError` if it names a value that is not given.
+    Parameters
+    ----------
+    package
+        Name of the package that contains the template.
+    template
+        Path of the template within the package.
+    values
+        Values by the names that the template uses.
+
+    Returns
+    -------
+    str
+        The text.
+
+    Raises
+    ------
+    jinja2.UndefinedError
+        If the template uses a name that has no value.
+
+    Notes
+    -----
+    Templates may use the filters of Jinja and these: ``number``, the shortest text that reads back
+    as the same double, and ``numbers`` of several; ``format`` as Python's for numbers, with a dash
+    for missing ones; ``plain`` for a user's text in Markdown; ``any`` and ``zip`` as in Python.
     """
     return environment(package).get_template(template).render(values)
 
@@ -30,51 +54,96 @@ def printable(text: str) -> str:
     >>> printable("one\ntwo \x1b[31m")
     'one two \\x1b[31m'
     """
-    return "".join(
-        letter if letter.isprintable() else repr(letter)[1:-1] for letter in " ".join(text.split())
-    )
+    one_line = " ".join(text.split())
+    return "".join([_printable_letter(letter) for letter in one_line])
+
+
+def _printable_letter(letter: str) -> str:
+    r"""A letter, or the escape sequence of an invisible one, such as ``\x1b``."""
+    return letter if letter.isprintable() else repr(letter)[1:-1]
 
 
 def aligned(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
-    """Rows of cells as text with aligned columns, those with the numbers ``right`` at their right ends."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    justify = [str.rjust if number in right else str.ljust for number in range(len(widths))]
-    filled = (
-        [fill(cell, width) for fill, cell, width in zip(justify, row, widths, strict=True)]
-        for row in rows
-    )
-    return "\n".join("  ".join(row).rstrip() for row in filled)
+    """Rows of cells as text with aligned columns.
+
+    Parameters
+    ----------
+    rows
+        Texts of the cells; all rows have the same number.
+    right
+        Indices of the columns that are aligned at their right ends.
+
+    Examples
+    --------
+    >>> print(aligned([("beads", "2"), ("walls", "10")], right=[1]))
+    beads   2
+    walls  10
+    """
+    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        cells = []
+        for number, (cell, width) in enumerate(zip(row, widths, strict=True)):
+            cells.append(cell.rjust(width) if number in right else cell.ljust(width))
+        lines.append("  ".join(cells).rstrip())
+    return "\n".join(lines)
+
+
+def with_unit(words: str, unit: str | None) -> str:
+    """A label with its unit in parentheses, if there is one."""
+    return f"{words} ({unit})" if unit else words
+
+
+# --- filters of templates -------------------------------------------------------------------------
+
+
+def _number(value: float) -> str:
+    """A number as the shortest text that reads back as the same double."""
+    return repr(float(value))
+
+
+def _numbers(values: Iterable[float]) -> str:
+    """Numbers as by `_number`, with spaces between them."""
+    return " ".join([_number(value) for value in values])
 
 
 def _formatted(value: float | None, form: str, missing: str = "-") -> str:
-    return missing if value is None or not isfinite(value) else f"{value:{form}}"
+    """A number in a format of Python; ``missing`` for None, NaN and infinity."""
+    if value is None or not isfinite(value):
+        return missing
+    return f"{value:{form}}"
 
 
 def _plain(text: str) -> str:
+    """A user's text on one line of Markdown, whose symbols it escapes."""
     return re.sub(r"[\\`*_<>|&\[\]]", r"\\\g<0>", printable(text))
 
 
 _FILTERS: Mapping[str, Callable[..., Any]] = {
-    "number": lambda value: repr(float(value)),
-    "numbers": lambda values: " ".join([repr(float(value)) for value in values]),
+    "number": _number,
+    "numbers": _numbers,
     "format": _formatted,
     "plain": _plain,
     "any": any,
     "zip": zip,
 }
-
-
-def with_unit(words: str, unit: str | None) -> str:
-    """A label with its unit, if there is one."""
-    return f"{words} ({unit})" if unit else words
+"""Filters of templates, see `rendered`."""
 
 
 @cache
 def environment(*packages: str, html: bool = False) -> Environment:
-    """The environment that renders templates of packages; in ``html`` values are escaped."""
+    """The environment of Jinja that renders templates of packages.
+
+    Parameters
+    ----------
+    *packages
+        Packages in which templates are searched, the first one first.
+    html
+        Whether the templates are of HTML, in which values are escaped.
+    """
     from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
-    environment = Environment(
+    jinja = Environment(
         loader=ChoiceLoader([PackageLoader(package, ".") for package in packages]),
         undefined=StrictUndefined,
         autoescape=html,
@@ -83,5 +152,5 @@ def environment(*packages: str, html: bool = False) -> Environment:
         lstrip_blocks=True,
         auto_reload=False,
     )
-    environment.filters.update(_FILTERS)
-    return environment
+    jinja.filters.update(_FILTERS)
+    return jinja
