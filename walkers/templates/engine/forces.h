@@ -17,7 +17,7 @@
        l_j n × T - n × (C s + Q q) + M_r    on j
 
    The pull P and the resistances N, S, C and Q belong to the bridge and come from its table; the
-   laws and their sources stand in walkers/physics/laws. Surfaces that overlap by d = -h > 0 also
+   laws and their sources are in walkers/physics/laws. Surfaces that overlap by d = -h > 0 also
    have
 
        repulsion           F_el = 4/3 E* √R* d^(3/2)                                        [1]
@@ -60,7 +60,7 @@ struct Materials {
   double rolling_friction;  // μ_r
 };
 
-/* Places in the history of a contact: number of its table (law.h) and elongation of its spring. */
+/* Indices in the history of a contact: number of its table (law.h) and elongation of its spring. */
 enum { TABLE, SPRING, HISTORY = SPRING + 3 };
 
 /* Contacts between the same two materials, whose forces are computed together. */
@@ -86,7 +86,7 @@ struct Batch {
   const Materials *materials;
   double *history[CAPACITY];
 
-  /* The count rounded up to whole lanes; what the lanes beyond it compute is not used. */
+  /* The count rounded up to whole lanes; the results of the lanes beyond the count are not used. */
   int padded_count() const { return (count + LANES - 1) / LANES * LANES; }
 };
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Copyright (c) 2026, the granular-walkers developers
 /* The pair style "gran model hertz tangential history cohesion bridge": contacts and bridges
-   between spheres. The equations stand in forces.h.
+   between spheres. The equations are in forces.h.
 
    The engine's own loop is for any shape and any models. It is written out here for spheres and
    for these models, and gathers contacts in batches whose forces are computed together. */
@@ -55,7 +55,7 @@ public:
 
 private:
   const int64_t hash_;
-  PairGran *pair_;  // of this step, as what follows
+  PairGran *pair_;  // valid for this step, like the following members
   bool applies_;    // forces are added to those of the beads
   bool updates_;    // springs stretch
   bool lists_;      // contacts are rows of a "compute pair/gran/local"
@@ -104,7 +104,7 @@ private:
     flush();
   }
 
-  /* What the engine is to know of a contact, by which it keeps its history. */
+  /* The flags of a contact in the neighbour list: the engine keeps the history of those with any. */
   static inline int flags_of(const bool touches, const bridge::Table *const table)
   {
     if (touches) return CONTACT_NORMAL_MODEL | CONTACT_COHESION_MODEL | CONTACT_TANGENTIAL_MODEL;

@@ -74,7 +74,7 @@ private:
   double period_, largest_;
   std::vector<Piece> pieces_;
 
-  /* What a power k has as a factor in a derivative. */
+  /* The factor of the power k in the derivative of this order. */
   static int factor(const int k, const int order)
   {
     if (order == 0) return 1;
@@ -104,7 +104,7 @@ struct Wave {
 
 class Shaking {
 public:
-  // What the command says.
+  // From the command.
   std::vector<Wave> waves;
   Course ramp;        // factor of the displacement; empty: 1
   Vec gravity;        // m/s²
@@ -113,8 +113,9 @@ public:
 
   Shaking() : gravity{0., 0., 0.}, begin(0), in_lab_frame(true), shift_(), velocity_() {}
 
-  /* To be called once the command is read. The file contains the loads of beads that have
-     others; "" if all have the same. The largest number of a bead is largest_tag. */
+  /* To be called once the command is read. The file contains the loads of the beads whose loads
+     differ from those of the command; it is "" if there are none. The largest number of a bead is
+     largest_tag. */
   void set_loads(const std::string &file, const size_t largest_tag)
   {
     loads_.assign(1, gravity);
@@ -135,7 +136,8 @@ public:
   Vec shift() const { return shift_; }        // of the walls now, m
   Vec velocity() const { return velocity_; }  // of the walls, m/s
 
-  /* Puts the walls where they are at a step. Their velocity is that of a time earlier, s. */
+  /* Moves the walls to where they are at a step. Their velocity is that of the time which is
+     `earlier` seconds before. */
   void move(const bigint step, const double time_step, const double earlier)
   {
     shift_ = velocity_ = {0., 0., 0.};

@@ -42,7 +42,7 @@ namespace bridge {
 
 enum { PULL, NORMAL, SLIDING, COUPLING, ROLLING, COLUMNS };
 
-/* The words of a text, without comments. */
+/* The words of a text, one after the other, without comments. */
 class Words {
 public:
   explicit Words(const char *const text) : at_(text) {}
@@ -193,16 +193,16 @@ private:
 
   static Cell cell(const double *const row)
   {
-    Cell made;
+    Cell cubic;
     for (int c = 0; c < COLUMNS; c++) {
       const double f0 = row[c], f1 = row[c + COLUMNS];
       const double f2 = row[c + 2 * COLUMNS], f3 = row[c + 3 * COLUMNS];
-      made.coefficient[0][c] = f0;
-      made.coefficient[1][c] = -5.5 * f0 + 9. * f1 - 4.5 * f2 + f3;
-      made.coefficient[2][c] = 9. * f0 - 22.5 * f1 + 18. * f2 - 4.5 * f3;
-      made.coefficient[3][c] = -4.5 * f0 + 13.5 * f1 - 13.5 * f2 + 4.5 * f3;
+      cubic.coefficient[0][c] = f0;
+      cubic.coefficient[1][c] = -5.5 * f0 + 9. * f1 - 4.5 * f2 + f3;
+      cubic.coefficient[2][c] = 9. * f0 - 22.5 * f1 + 18. * f2 - 4.5 * f3;
+      cubic.coefficient[3][c] = -4.5 * f0 + 13.5 * f1 - 13.5 * f2 + 4.5 * f3;
     }
-    return made;
+    return cubic;
   }
 };
 

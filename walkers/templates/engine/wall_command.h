@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Copyright (c) 2026, the granular-walkers developers
-/* The command "fix ID GROUP wall/bridge ..." as walls and shaking; README.md has its syntax. */
+/* Reads the command "fix ID GROUP wall/bridge ...", whose syntax is in README.md. */
 #ifndef BRIDGE_WALL_COMMAND_H
 #define BRIDGE_WALL_COMMAND_H
 
@@ -39,7 +39,7 @@ private:
   char **words_;
 };
 
-/* What the command says. Throws std::runtime_error if it cannot be used. */
+/* Walls and shaking of a command. Throws std::runtime_error if the command cannot be used. */
 class WallCommand {
 public:
   int type;  // atom type of the walls

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-2.0-or-later
 // Copyright (c) 2026, the granular-walkers developers
 /* The fix "wall/bridge": contacts and bridges of beads with walls, and the shaking. The equations
-   stand in forces.h; a wall is a body of infinite radius and mass.
+   are in forces.h; a wall is a body of infinite radius and mass.
 
    LIGGGHTS's mesh walls are slow, and its primitive walls do not report their contacts. */
 #ifndef BRIDGE_WALL_FIX_H
@@ -41,7 +41,7 @@ public:
 
   int setmask() { return FixConst::PRE_NEIGHBOR | FixConst::POST_FORCE | FixConst::END_OF_STEP; }
 
-  // The tables of materials of the engine extend to the largest type that is in use.
+  // The engine makes its tables of materials for types up to the largest one that is in use.
   int min_type() { return type_; }
   int max_type() { return type_; }
 
@@ -206,9 +206,9 @@ private:
     array_local = rows_.data();
   }
 
-  /* Computes all contacts and bridges with walls. With applies, their forces are added to those
-     of the beads; with updates, springs stretch for a step; cells, if not 0, receives a row for
-     each. */
+  /* Computes all contacts and bridges with walls. If applies, their forces are added to those of
+     the beads; if updates, springs stretch for a step; cells, if not 0, receives a row for each
+     contact and bridge. */
   void compute_contacts(const bool applies, const bool updates, std::vector<double> *const cells)
   {
     const double infinity = std::numeric_limits<double>::infinity();

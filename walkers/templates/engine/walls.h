@@ -20,7 +20,7 @@
 
 namespace {
 
-/* A wall at rest; for walls that are displaced, shift is the displacement. */
+/* A wall where it rests. The functions take the displacement of the walls as their shift, m. */
 class Wall {
 public:
   static Wall plane(const Vec point, const Vec normal)
@@ -32,7 +32,7 @@ public:
     return wall;
   }
 
-  /* With its axis along z. */
+  /* A cylinder with its axis along z. */
   static Wall cylinder(const double x, const double y, const double radius)
   {
     if (!(radius > 0.)) throw std::runtime_error("a cylinder has a radius that is not above 0");
@@ -75,8 +75,8 @@ public:
     return distance - radius;
   }
 
-  /* A gap that is quick to compute, for finding beads near the wall: of a facet that to its box,
-     which is at most the gap to the facet. */
+  /* A gap that is quick to compute, for finding beads near the wall. For a facet it is the gap to
+     its box, which is at most the gap to the facet. */
   double lowest_gap(const Vec centre, const double radius, const Vec shift) const
   {
     Vec n;
@@ -104,12 +104,12 @@ public:
 private:
   enum Kind { PLANE, CYLINDER, FACE, EDGE, CORNER };
 
-  /* The points x with way · (x - at) > bound. */
+  /* The points x with direction · (x - point) > bound. */
   struct Half {
-    Vec at, way;
+    Vec point, direction;
     double bound;
 
-    bool contains(const Vec x) const { return dot(way, x - at) > bound; }
+    bool contains(const Vec x) const { return dot(direction, x - point) > bound; }
   };
   typedef std::vector<Half> Cell;  // the points in all of its halves
 
@@ -129,7 +129,7 @@ private:
 
   static bool read(std::ifstream &in, Vec &v) { return static_cast<bool>(in >> v.x >> v.y >> v.z); }
 
-  /* Reads what follows the word of a facet; false if it is incomplete. */
+  /* Reads what follows the name of a kind of facet; returns false if it is incomplete. */
   bool read(std::ifstream &in)
   {
     size_t cells;
@@ -140,9 +140,9 @@ private:
       cells_.push_back({});
       for (; halves; halves--) {
         Half half;
-        if (!read(in, half.at) || !read(in, half.way) || !(in >> half.bound)) return false;
+        if (!read(in, half.point) || !read(in, half.direction) || !(in >> half.bound)) return false;
         cells_.back().push_back(half);
-        extend_box(half.at);
+        extend_box(half.point);
       }
     }
     return true;
