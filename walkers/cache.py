@@ -109,7 +109,7 @@ def is_safe(path: Path) -> bool:
 
 
 def is_trusted(path: Path) -> bool:
-    """Whether a file in a folder of the cache exists and can only have been written by the user or root."""
+    """Whether a file of the cache exists and only the user or root can have written it."""
     try:
         return is_safe(cache_folder()) and _is_safe_folder(path.parent) and is_safe(path)
     except OSError:

@@ -94,7 +94,8 @@ def _decimals(value: float, most: int) -> int:
 
 def counted(number: int, noun: str) -> str:
     """A number with its noun, such as ``2 runs``."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+    plural = "" if number == 1 else "s"
+    return f"{number} {noun}{plural}"
 
 
 def duration_text(seconds: float) -> str:

@@ -79,12 +79,16 @@ def aligned(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
     beads   2
     walls  10
     """
-    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    longest_cells = [max(column, key=len) for column in zip(*rows, strict=True)]
     lines = []
     for row in rows:
         cells = []
-        for number, (cell, width) in enumerate(zip(row, widths, strict=True)):
-            cells.append(cell.rjust(width) if number in right else cell.ljust(width))
+        for number, (cell, longest) in enumerate(zip(row, longest_cells, strict=True)):
+            width = len(longest)
+            if number in right:
+                cells.append(cell.rjust(width))
+            else:
+                cells.append(cell.ljust(width))
         lines.append("  ".join(cells).rstrip())
     return "\n".join(lines)
 
@@ -94,17 +98,17 @@ def with_unit(words: str, unit: str | None) -> str:
     return f"{words} ({unit})" if unit else words
 
 
-# --- filters of templates -------------------------------------------------------------------------
-
-
-def _number(value: float) -> str:
+def number_text(value: float) -> str:
     """A number as the shortest text that reads back as the same double."""
     return repr(float(value))
 
 
-def _numbers(values: Iterable[float]) -> str:
-    """Numbers as by `_number`, with spaces between them."""
-    return " ".join([_number(value) for value in values])
+def numbers_text(values: Iterable[float]) -> str:
+    """Numbers as by `number_text`, with spaces between them."""
+    return " ".join([number_text(value) for value in values])
+
+
+# --- filters of templates -------------------------------------------------------------------------
 
 
 def _formatted(value: float | None, form: str, missing: str = "-") -> str:
@@ -120,8 +124,8 @@ def _plain(text: str) -> str:
 
 
 _FILTERS: Mapping[str, Callable[..., Any]] = {
-    "number": _number,
-    "numbers": _numbers,
+    "number": number_text,
+    "numbers": numbers_text,
     "format": _formatted,
     "plain": _plain,
     "any": any,

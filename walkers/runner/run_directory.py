@@ -137,7 +137,8 @@ def run_place(case: Case, engine: Engine, out: Path) -> Path:
 def _sha256_of_law(case: Case) -> str | None:
     """SHA-256 of the file of a user's law; None for a built-in law."""
     if case.recorded_law:
-        return str(case.recorded_law.sha256) if case.recorded_law.sha256 else None
+        sha256: str | None = case.recorded_law.sha256
+        return sha256
     return source_sha256(case.liquid.law)
 
 

@@ -37,12 +37,11 @@ from walkers.templates.parameters import (
     in_cycles,
     length_parameters,
     material_parameters,
-    number_text,
     suffixes,
     vector_along,
 )
 from walkers.templates.placement import PlacedBodies, Surface, place, surface_of
-from walkers.text import rendered
+from walkers.text import numbers_text, rendered
 
 CONTENT_VERSION = 10
 """Version of the numbers of decks, part of the names of runs.
@@ -470,7 +469,6 @@ def _template_values(plan: Plan, layout: DeckLayout, files: Mapping[str, str]) -
     start_velocity = _start_velocity(case.excitation)
     parameters = _parameters(plan, contacts, liquid)
     derived = derived_parameters(case, shaken=plan.shaken, start_velocity=start_velocity)
-    record = case.excitation.record
     return {
         "plan": plan,
         "case": case,
@@ -491,7 +489,7 @@ def _template_values(plan: Plan, layout: DeckLayout, files: Mapping[str, str]) -
         "search": _neighbour_search(plan),
         "wall_words": _wall_words(plan.scene),
         "gravity_direction": _gravity_direction(case),
-        "record_axes": {axis: AXES[axis] for axis in record.axes} if record else {},
+        "record_axes": _record_axes(case.excitation),
         "start_velocity": start_velocity,
         **layout.bridge_terms(),
     }
@@ -538,6 +536,13 @@ def _start_velocity(drive: Excitation) -> list[float]:
         for axis in range(3):
             velocity[axis] += direction[axis] * float(speeds[0])
     return velocity
+
+
+def _record_axes(drive: Excitation) -> dict[str, Vector]:
+    """Unit vectors of the axes along which a record shakes the walls; empty without a record."""
+    if drive.record is None:
+        return {}
+    return {axis: AXES[axis] for axis in drive.record.axes}
 
 
 def _gravity_direction(case: Case) -> list[float]:
@@ -693,13 +698,8 @@ def _beads_data(scene: PlacedBodies, density: float, types: int) -> str:
     for bead in scene.beads:
         own_density = density if bead.density is None else bead.density
         numbers = (2.0 * bead.radius, own_density, *bead.centre)
-        lines.append(f"{bead.id} {bead.surface} {_numbers_text(numbers)}")
+        lines.append(f"{bead.id} {bead.surface} {numbers_text(numbers)}")
     lines += ["", "Velocities", ""]
     for bead in scene.beads:
-        lines.append(f"{bead.id} {_numbers_text((*bead.velocity, *bead.spin))}")
+        lines.append(f"{bead.id} {numbers_text((*bead.velocity, *bead.spin))}")
     return "\n".join(lines) + "\n"
-
-
-def _numbers_text(numbers: Sequence[float]) -> str:
-    """Numbers as texts that read back as the same doubles."""
-    return " ".join([number_text(number) for number in numbers])

@@ -17,6 +17,7 @@ from walkers.arrays import Vector
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.materials import Contact
 from walkers.physics.capillary import BridgeLiquid
+from walkers.text import number_text
 
 PRINTED = "parameters:"
 """Start of the line in which the engine prints the parameters."""
@@ -55,11 +56,6 @@ class Parameter:
         if not comment:
             return command
         return f"{command.ljust(_COMMENT_COLUMN)} # {comment}"
-
-
-def number_text(value: float) -> str:
-    """A number as the shortest text that reads back as the same double."""
-    return repr(float(value))
 
 
 def suffixes(count: int) -> list[str]:
