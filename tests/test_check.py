@@ -305,7 +305,7 @@ def test_a_dry_contact_with_a_wall_begins_without_friction(bench: Bench) -> None
     assert np.abs(series.forces[41:, 0, :2]).max() < 1e-9 * abs(shear)
 
 
-FORCES = {8: "e828c341160df6d4"}
+FORCES = {8: "5f5176340876043b"}
 
 
 def test_a_change_of_the_contact_model_asks_for_another_version_of_its_forces() -> None:
