@@ -1,4 +1,8 @@
-"""Values of a case in usual units by the keys of a case file; differences between cases."""
+"""Values of a case as text, by the keys of a case file, and the keys by which cases differ.
+
+Text is in the usual units of a case file, such as ``4 g``. Case files themselves are read in
+`walkers.inputs`.
+"""
 
 from __future__ import annotations
 
@@ -16,116 +20,178 @@ from walkers.inputs.origins import text_of
 from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.units import QuantityKind
 
+_NANOMETRES_PER_METRE = 1e9
+_SAME_VALUE = 1e-6
+"""Relative difference up to which a value in a condition equals that of a case."""
+_COMPARED_DIGITS = 12
+"""Significant digits in which values of different cases are compared."""
+_NOT_GIVEN = {"default", "derived"}
+"""Origins of values that no file and no library gives."""
+
 
 class FlatCase(dict[str, Any]):
-    """The values of a case by dotted key, SI units; ``words`` say where each is from, as `walkers.inputs.origins`."""
+    """The values of a case in SI units by dotted key.
 
-    words: Mapping[str, str] = {}
+    Attributes
+    ----------
+    origin_words
+        For each key, where its value is from: ``given``, ``library``, ``default`` … (`Origin.word`
+        of `walkers.inputs.origins`).
+    """
+
+    origin_words: Mapping[str, str] = {}
 
 
 def flattened(case: Case) -> FlatCase:
     """The values of a case as plain JSON types, by the keys of a case file."""
-    flat = FlatCase(
-        (origin.key, to_jsonable_python(origin.value))
-        for origin in case.origins
-        if origin.value is not None
-    )
-    if case.placed:  # which have no origins, because there may be hundreds
+    flat = FlatCase()
+    origin_words = {"placed": "given"}
+    for origin in case.origins:
+        origin_words[origin.key] = origin.word
+        if origin.value is not None:
+            flat[origin.key] = to_jsonable_python(origin.value)
+    if case.placed:  # placed beads have no origins, because there may be hundreds of them
         flat["placed"] = [[*bead.at, bead.radius] for bead in case.placed]
-    flat.words = {"placed": "given", **{origin.key: origin.word for origin in case.origins}}
+    flat.origin_words = origin_words
     return flat
 
 
 def readable(key: str, value: Any) -> str:
-    """A value of `flattened` as a case file has it, such as ``4 g``; a dash for none."""
+    """A value of `flattened` as it stands in a case file, such as ``4 g``; a dash for None."""
     if value is None:
         return "-"
     if key == "environment.gravity":  # the unit g is the paper's 9.8 m/s², not gravity
         return f"{value:.6g} m/s^2"
     if key.startswith("contact.roughness."):
-        return f"{value * 1e9:.6g} nm"
-    if key == "drive.ramp":  # pairs of a time and a pure number
-        return ", ".join(
-            f"({text_of(time, quantity_kind(key))}, {text_of(factor)})" for time, factor in value
-        )
-    return text_of(value, quantity_kind(key))
+        return f"{value * _NANOMETRES_PER_METRE:.6g} nm"
+    kind = quantity_kind(key)
+    if key == "drive.ramp":  # pairs of a time and a factor, which has no unit
+        pairs = [f"({text_of(time, kind)}, {text_of(factor)})" for time, factor in value]
+        return ", ".join(pairs)
+    return text_of(value, kind)
 
 
 def has_value(case: Mapping[str, Any], condition: str) -> bool | None:
-    """Whether a flattened case has a value, ``KEY=VALUE`` as a case file has it, such as ``frequency=80 Hz``.
+    """Whether a case has a value.
 
-    The key may be the end of a key. None if there is no such key. `InputError` if the condition cannot be read.
+    Parameters
+    ----------
+    case
+        A flattened case.
+    condition
+        ``KEY=VALUE`` with a value as in a case file, such as ``frequency=80 Hz``. The key may be
+        the end of a dotted key; the condition holds if it holds for one of the keys with this end.
+
+    Returns
+    -------
+    bool or None
+        None if the case has no such key.
+
+    Raises
+    ------
+    InputError
+        If the condition cannot be read.
     """
-    key, _, text = (part.strip() for part in condition.partition("="))
-    if not (key and text):
-        raise input_error(
-            "where", f'"{condition}": expected KEY=VALUE, such as "drive.frequency=80 Hz"'
-        )
-    values = {name: value for name, value in case.items() if f".{name}".endswith(f".{key}")}
-    return (
-        any(_is(name, value, text.strip('"')) for name, value in values.items()) if values else None
-    )
+    before, _, after = condition.partition("=")
+    key = before.strip()
+    text = after.strip()
+    if not key or not text:
+        expected = 'expected KEY=VALUE, such as "drive.frequency=80 Hz"'
+        raise input_error("where", f'"{condition}": {expected}')
+    matching = [name for name in case if f".{name}".endswith(f".{key}")]
+    if not matching:
+        return None
+    return any(_equals(name, case[name], text.strip('"')) for name in matching)
 
 
-def _is(key: str, value: Any, text: str) -> bool:
-    """Whether a value is equal to a value as text, in any unit of its kind."""
-    number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not number or text == str(value):
+def _equals(key: str, value: Any, text: str) -> bool:
+    """Whether the value of a key equals a value that is given as text, in any unit of its kind."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not is_number or text == str(value):
         return text.lower() in (readable(key, value).lower(), str(value).lower())
     kind = quantity_kind(key)
     try:
-        return isclose(
-            units.parse_quantity(text, kind) if kind else float(text), value, rel_tol=1e-6
-        )
+        number = float(text) if kind is None else units.parse_quantity(text, kind)
     except ValueError as error:
-        raise input_error(
-            "where", f'"{key}={text}": {error if kind else "expected a number without a unit"}'
-        ) from error
+        reason = "expected a number without a unit" if kind is None else error
+        raise input_error("where", f'"{key}={text}": {reason}') from error
+    return isclose(number, value, rel_tol=_SAME_VALUE)
 
 
 @cache
 def quantity_kind(key: str) -> QuantityKind | None:
-    """Kind of quantity of a key of a case, such as ``dimers.radii[0]``; None for pure numbers."""
-    fields = (
-        field for name, field in dotted_keys(CaseFile).items() if _ending(name) == _ending(key)
-    )
-    return next(
-        filter(None, (units.kind_in([*field.metadata, field.annotation]) for field in fields)), None
-    )
+    """The kind of quantity of a key of a case, such as ``dimers.radii[0]``; None for pure numbers."""
+    for name, field in dotted_keys(CaseFile).items():
+        if _last_two_parts(name) == _last_two_parts(key):
+            kind = units.kind_in([*field.metadata, field.annotation])
+            if kind is not None:
+                return kind
+    return None
 
 
-def _ending(key: str) -> str:
-    """The last two parts of a key, without places in lists: ``bead_wall`` is a friction or a roughness."""
-    return ".".join(part.partition("[")[0] for part in key.split(".")[-2:])
+def _last_two_parts(key: str) -> str:
+    """The last two parts of a key without indices of lists.
+
+    One part is not enough: ``bead_wall`` is a friction or a roughness.
+    """
+    names = [part.partition("[")[0] for part in key.split(".")]
+    return ".".join(names[-2:])
 
 
 def differing(cases: Sequence[FlatCase]) -> tuple[list[str], list[str]]:
-    """The keys whose values differ among flattened cases, in the cases' order: those that a case gives, and others.
+    """The keys whose values differ among cases, in the order of the cases' keys.
 
-    No case gives the others itself: a time step that ``"auto"`` chose, the properties of a liquid in the library. A
-    default, or a value derived from others, that some cases do not have is left out: it is of a table that they lack.
+    A default or a derived value that some cases lack is left out: it belongs to a table that they
+    do not have.
+
+    Returns
+    -------
+    given : list of str
+        Keys that a case gives itself.
+    implied : list of str
+        Keys that no case gives, such as a time step that ``"auto"`` chose, or the properties of a
+        liquid of the library.
     """
-    keys = dict.fromkeys(key for case in cases for key in case)
-    varied = [key for key in keys if len({_comparable(case.get(key)) for case in cases}) > 1]
-    words = {key: {case.words.get(key, "") for case in cases} for key in varied}
-    given = [key for key in varied if any(word.startswith("given") for word in words[key])]
-    rest = [key for key in varied if key not in given]
-    return given, [
-        key for key in rest if "" not in words[key] or words[key] - {"", "default", "derived"}
-    ]
+    keys: dict[str, None] = {}  # as a set, but in the order of the cases
+    for case in cases:
+        keys |= dict.fromkeys(case)
+    given = []
+    implied = []
+    for key in keys:
+        if len({_comparable(case.get(key)) for case in cases}) == 1:
+            continue
+        words = {case.origin_words.get(key, "") for case in cases}
+        if any(word.startswith("given") for word in words):
+            given.append(key)
+        elif not _follows_from_a_missing_table(words):
+            implied.append(key)
+    return given, implied
+
+
+def _follows_from_a_missing_table(origin_words: set[str]) -> bool:
+    """Whether a key has no value in some cases, and a value that nobody gave in the others."""
+    return "" in origin_words and origin_words <= {"", *_NOT_GIVEN}
 
 
 def short_keys(keys: Sequence[str], reserved: Iterable[str] = ("name",)) -> list[str]:
-    """The last parts of keys; the whole key if another key has the same last part, or if it is ``reserved``."""
-    last = [key.rpartition(".")[2] for key in keys]
+    """The last parts of keys, as headings of columns.
+
+    A key stays whole if another key has the same last part, or if its last part is one of the
+    ``reserved`` headings.
+    """
+    last_parts = [key.rpartition(".")[2] for key in keys]
     taken = set(reserved).difference(keys)
-    return [
-        key if end in taken or last.count(end) > 1 else end
-        for key, end in zip(keys, last, strict=True)
-    ]
+    short = []
+    for key, last_part in zip(keys, last_parts, strict=True):
+        is_ambiguous = last_part in taken or last_parts.count(last_part) > 1
+        short.append(key if is_ambiguous else last_part)
+    return short
 
 
 def _comparable(value: Any) -> Hashable:
+    """A value that can be compared: lists as tuples, numbers without their last digits."""
     if isinstance(value, (list, tuple)):
         return tuple(_comparable(item) for item in value)
-    return float(f"{value:.12g}") if isinstance(value, float) else value
+    if isinstance(value, float):
+        return float(f"{value:.{_COMPARED_DIGITS}g}")
+    return value

@@ -59,7 +59,7 @@ def compare_runs(first: Side, second: Side) -> Comparison:
     """Compare two runs, or cases not yet run."""
     names, flat = [first.name, second.name], [flattened(side.case) for side in (first, second)]
     parameters = {key: [values.get(key) for values in flat] for key in chain(*differing(flat))}
-    sources = {key: [case.words.get(key) for case in flat] for key in parameters}
+    sources = {key: [case.origin_words.get(key) for case in flat] for key in parameters}
     changed = [
         [
             key,
