@@ -1,13 +1,15 @@
-"""Comparison of two runs: parameters and results."""
+"""Comparison of two runs, or of two cases that were not run: parameters and results.
+
+The significance of a difference over many runs is not computed here; see `walkers.sweeps`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import chain
-from math import hypot, nan
+from dataclasses import asdict, dataclass
+from math import hypot, isfinite, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from walkers.physics.laws import LAWS
 from walkers.postprocess.measure.numbers import (
@@ -37,10 +39,28 @@ if TYPE_CHECKING:
 
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
 """Numbers whose scatter is in the result."""
+_HIDDEN_CHANGE = 2e-3
+"""Relative difference below which printed values may be rounded to a difference of their own."""
+_DASH = "-"
+_OTHER_BRIDGE_TABLES = (
+    "its bridge tables are not those of this program: made by another version, "
+    "or on another kind of machine"
+)
 
 
-class Side(NamedTuple):
-    """A side of a comparison: its name, its case, and the directory of its finished run if there is one."""
+@dataclass(frozen=True)
+class Side:
+    """One of the two runs or cases that are compared.
+
+    Attributes
+    ----------
+    name
+        Heading of its column.
+    case
+        Its case.
+    directory
+        The directory of its finished run; None if there is none.
+    """
 
     name: str
     case: Case
@@ -49,195 +69,366 @@ class Side(NamedTuple):
 
 @dataclass(frozen=True)
 class Comparison:
-    """Differences as JSON in SI units, and as text in readable units."""
+    """Differences of two runs or cases.
+
+    Attributes
+    ----------
+    contents
+        As JSON, in SI units.
+    text
+        As text, in displayed units.
+    """
 
     contents: Mapping[str, Any]
     text: str
 
 
+@dataclass(frozen=True)
+class _Parameter:
+    """A key whose values differ between the cases, with the values (SI) and where each is from."""
+
+    key: str
+    values: Sequence[Any]
+    origin_words: Sequence[str | None]
+
+
+@dataclass(frozen=True)
+class _FinishedRun:
+    """The name of a side, and the results of its run."""
+
+    name: str
+    results: Results
+
+
+@dataclass(frozen=True)
+class _ComparedNumber:
+    """A number of both results in SI units, as it is in the JSON; NaN where a run does not have it.
+
+    The difference is that of the second run from the first; the numerical error is that of the
+    difference. The scatter is None where a result has none.
+    """
+
+    quantity: str
+    unit: str
+    first: float
+    second: float
+    first_scatter: float | None
+    second_scatter: float | None
+    difference: float
+    numerical_error: float
+
+    @property
+    def differs(self) -> bool:
+        """Whether the values differ, or only one run has the number."""
+        return self.first != self.second
+
+
 def compare_runs(first: Side, second: Side) -> Comparison:
-    """Compare two runs, or cases not yet run."""
-    names, flat = [first.name, second.name], [flattened(side.case) for side in (first, second)]
-    parameters = {key: [values.get(key) for values in flat] for key in chain(*differing(flat))}
-    sources = {key: [case.origin_words.get(key) for case in flat] for key in parameters}
-    changed = [
-        [
-            key,
-            *(readable(key, value) for value in values),
-            " / ".join(dict.fromkeys(filter(None, sources[key]))),
-        ]
-        for key, values in parameters.items()
-    ]
-    text = [
-        aligned([["parameter", *names, "source"], *changed])
-        if changed
-        else "the cases are the same"
-    ]
-    not_run, rows = [side.name for side in (first, second) if side.directory is None], []
+    """Compare two runs, or cases that were not run.
+
+    Results are compared if both sides have a finished run.
+    """
+    sides = (first, second)
+    not_run = [side.name for side in sides if side.directory is None]
+    parameters = _differing_parameters(first.case, second.case)
+    parameters_text = _parameters_text(parameters, [side.name for side in sides])
+    results_text: list[str] = []
+    numbers: list[_ComparedNumber] = []
     if first.directory and second.directory:
-        results = [read_results(first.directory), read_results(second.directory)]
-        rows = _rows(*results)
-        apart = {row["quantity"]: row for row in rows if row["first"] != row["second"]}
-        if "cycles" in apart and not changed:
-            text = [
-                f"{text[0]}, but ran {' and '.join(_cells(apart['cycles'], results)[1:3])} cycles"
-            ]
-        if apart:
-            heads = ["result", *names, "difference", "scatter of copies", "numerical error"]
-            columns = zip(heads, *(_cells(row, results) for row in apart.values()), strict=True)
-            shown = [column for column in columns if {*column[1:]} != {"-"}]
-            text.append(aligned([*zip(*shown, strict=True)]))
-            if heads[4] in [column[0] for column in shown]:
-                text.append(
-                    "scatter of copies: how much copies differ by their start; no error of the difference"
-                )
-        named = dict(zip(names, results, strict=True))
-        doubts = [
-            f"{name}: warning: {doubt}"
-            for name, result in named.items()
-            for doubt in result.warnings
-        ]
-        text += ["\n".join(lines) for lines in (_of_errors(apart, named), doubts) if lines]
-        if same := [row["quantity"] for row in rows if row["quantity"] not in apart]:
-            text.append(
-                f"the same in both: {', '.join(same)}" if apart else "all results are the same"
-            )
-    text += _of_tables(first, second)
+        runs = (
+            _FinishedRun(first.name, read_results(first.directory)),
+            _FinishedRun(second.name, read_results(second.directory)),
+        )
+        numbers = _compared_numbers(runs[0].results, runs[1].results)
+        results_text = _results_text(numbers, runs)
+        if not parameters:
+            parameters_text += _cycles_text(numbers, runs)
+    other_tables = [side.name for side in sides if _has_other_bridge_tables(side)]
+    text = [parameters_text, *results_text]
+    text += [f"{name}: {_OTHER_BRIDGE_TABLES}" for name in other_tables]
     text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
     contents = {
         "first": first.name,
         "second": second.name,
-        "parameters": parameters,
-        "sources": sources,
+        "parameters": {parameter.key: parameter.values for parameter in parameters},
+        "sources": {parameter.key: parameter.origin_words for parameter in parameters},
+        "not_run": not_run,
+        "results": [json_numbers(asdict(number)) for number in numbers],
     }
-    return Comparison(contents | {"not_run": not_run, "results": rows}, "\n\n".join(text))
+    return Comparison(contents, "\n\n".join(text))
 
 
-def _of_tables(*sides: Side) -> list[str]:
-    """A line for each finished run whose bridge tables are not those that this program makes of its case."""
-    lines = []
-    for side in sides:
-        if side.directory is None or side.case.liquid.law not in LAWS:
-            continue
-        try:
-            manifest = read_manifest(side.directory)
-        except (OSError, ValueError):  # what else reads it says so
-            continue
-        if manifest.get("by_hand") or manifest.get("bridge_tables") in (
-            None,
-            bridge_tables_digest(side.case),
-        ):
-            continue
-        lines.append(
-            f"{side.name}: its bridge tables are not those of this program: made by another version, "
-            "or on another kind of machine"
-        )
-    return lines
+def _differing_parameters(first: Case, second: Case) -> list[_Parameter]:
+    """The keys whose values differ: those that a case gives, then those that follow from others."""
+    cases = [flattened(first), flattened(second)]
+    given, implied = differing(cases)
+    parameters = []
+    for key in [*given, *implied]:
+        values = [case.get(key) for case in cases]
+        origin_words = [case.origin_words.get(key) for case in cases]
+        parameters.append(_Parameter(key, values, origin_words))
+    return parameters
 
 
-def _of_errors(apart: Mapping[str, Mapping[str, Any]], named: Mapping[str, Results]) -> list[str]:
-    """How many times its numerical error a velocity differs, bands of both runs, and which errors are not computed."""
-    rows, results = [apart[name] for name in _VELOCITIES if name in apart], named.values()
-    lines = [
-        f"{row['quantity']}: differs by {error_text(abs(row['difference']) / row['numerical_error'], '')} times "
-        "its numerical error"
-        for row in rows
-        if row["numerical_error"]
-    ]
-    if any(headline(result) in apart for result in results):
-        lines += [f"{name}: {text}" for name, result in named.items() if (text := _of_band(result))]
-        if shared := _shared_unknowns(*results):
-            values = (
-                "1 uncertain value belongs"
-                if len(shared) == 1
-                else f"{len(shared)} uncertain values belong"
-            )
-            may = "may be equal in both: the bands may overlap although the difference is certain"
-            lines.append(f"{values} to both runs and {may}")
-    places = [str(result.directory) for result in results if not_computed(result).numerical_error]
-    if rows and places:
-        lines.append(f"to measure numerical errors: walkers run {' '.join(places)} --accuracy")
-    return lines
+def _parameters_text(parameters: Sequence[_Parameter], names: Sequence[str]) -> str:
+    """A table of the parameters with the names of both sides as headings."""
+    if not parameters:
+        return "the cases are the same"
+    rows = [["parameter", *names, "source"]]
+    for parameter in parameters:
+        values = [readable(parameter.key, value) for value in parameter.values]
+        sources = dict.fromkeys(word for word in parameter.origin_words if word)
+        rows.append([parameter.key, *values, " / ".join(sources)])
+    return aligned(rows)
 
 
-def _shared_unknowns(*results: Results) -> set[str]:
-    """Keys of the uncertain values on which all of some results rest."""
-    return set.intersection(*[_uncertain_keys(result) for result in results])
+def _has_other_bridge_tables(side: Side) -> bool:
+    """Whether a finished run has other bridge tables than this program computes for its case."""
+    if side.directory is None or side.case.liquid.law not in LAWS:
+        return False
+    try:
+        manifest = read_manifest(side.directory)
+    except (OSError, ValueError):  # reading the result reports this
+        return False
+    tables = manifest.get("bridge_tables")
+    if manifest.get("by_hand") or tables is None:
+        return False
+    return bool(tables != bridge_tables_digest(side.case))
 
 
-def _uncertain_keys(result: Results) -> set[str]:
-    return {value["key"] for value in result.about["rests_on"] if value["range"]}
+# --- numbers ------------------------------------------------------------------------------------
 
 
-def _of_band(result: Results) -> str:
-    """The band of the main number of a run, or on how many uncertain values it rests; empty if there are none."""
-    if (main := headline(result)) and (band := band_of(result, quantity := declared(main))):
-        return f"{with_unit(main, unit_shown(quantity.unit)[0])}, {band}"
-    if not not_computed(result).uncertain_values:
-        return ""
-    uncertain = [value["origin"] for value in result.about["rests_on"] if value["range"]]
-    rests = f"rests on {counted(len(uncertain), 'uncertain value')}, {uncertain.count('default')} guessed"
-    return f"{main} {rests}; the band over the ranges is not computed (--spread)"
+def _compared_numbers(first: Results, second: Results) -> list[_ComparedNumber]:
+    """The numbers of two results that are worth comparing, in the order of their declarations.
 
-
-def _rows(first: Results, second: Results) -> list[dict[str, Any]]:
-    """The numbers of two results, without errors, values of the case and conditions, and means over both facings.
-
-    A level run and a slope have the velocity in common; up the slope alone, if walkers turned over or lean. Runs of
-    which walkers came apart have none.
+    Errors, values of the case and conditions are left out, and so are means over both facings
+    if these differ. A level run and a slope have the velocity in common; if walkers turned over or
+    lean, only the velocity up the slope. Runs whose walkers came apart have no velocity in common.
     """
-    heads, results = {headline(first), headline(second)}, {"first": first, "second": second}
-    little = {*_VELOCITIES} if "axial_velocity" in heads else {"velocity"} - heads
-    if any(
-        result.get("facings_differ") and not result.get("goes_uphill")
-        for result in results.values()
-    ):
-        little.add("velocity")
-    little.update(ASIDE, ["coverage"], *map(saying_nothing, results.values()))
-    names = {name for name in {*first, *second} - little if not is_error(name)}
-    rows = []
+    left_out = _not_compared(first, second)
+    names = set()
+    for name in {*first, *second} - left_out:
+        if not is_error(name):
+            names.add(name)
+    numbers = []
     for name, (unit, _) in described_columns(names).items():
-        numbers = {side: _number(result.get(name)) for side, result in results.items()}
-        scatters = {
-            f"{side}_scatter": result.get(scatter_of(name)) for side, result in results.items()
-        }
-        error = hypot(*(result.get(f"{name}_error", nan) for result in results.values()))
-        changes = {"difference": numbers["second"] - numbers["first"], "numerical_error": error}
-        row = json_numbers({"quantity": name, "unit": unit, **numbers, **scatters, **changes})
-        if row["first"] is not None or row["second"] is not None:
-            rows.append(row)
-    return rows
+        number = _compared_number(name, unit, first, second)
+        if isfinite(number.first) or isfinite(number.second):
+            numbers.append(number)
+    return numbers
+
+
+def _not_compared(first: Results, second: Results) -> set[str]:
+    """Names of numbers that say nothing about the difference of two results."""
+    left_out = {*ASIDE, "coverage"}
+    main_numbers = {headline(first), headline(second)}
+    if "axial_velocity" in main_numbers:
+        left_out |= {*_VELOCITIES}
+    elif "velocity" not in main_numbers:
+        left_out.add("velocity")
+    for results in (first, second):
+        if results.get("facings_differ") and not results.get("goes_uphill"):
+            left_out.add("velocity")
+        left_out |= saying_nothing(results)
+    return left_out
+
+
+def _compared_number(name: str, unit: str, first: Results, second: Results) -> _ComparedNumber:
+    value_of_first = _number(first.get(name))
+    value_of_second = _number(second.get(name))
+    scatter = scatter_of(name)
+    errors = [results.get(f"{name}_error", nan) for results in (first, second)]
+    return _ComparedNumber(
+        quantity=name,
+        unit=unit,
+        first=value_of_first,
+        second=value_of_second,
+        first_scatter=first.get(scatter),
+        second_scatter=second.get(scatter),
+        difference=value_of_second - value_of_first,
+        numerical_error=hypot(*errors),
+    )
 
 
 def _number(value: Any) -> float:
-    return nan if value is None or isinstance(value, str) else float(value)
+    """A value of a result as a number; NaN if there is none, or if it is text."""
+    if value is None or isinstance(value, str):
+        return nan
+    return float(value)
 
 
-def _cells(row: Mapping[str, Any], results: Sequence[Results]) -> list[str]:
-    """A row as text in readable units; a number of walkers that face up says so beside that of all walkers."""
-    unit, size = unit_shown(row["unit"])
-    first, second, difference = (
-        size * _number(row[name]) for name in ("first", "second", "difference")
-    )
-    printed = [rounded(value, unit) for value in (first, second)]
-    if abs(difference) < 2e-3 * abs(
-        first
-    ):  # digits that are not printed would contradict the printed ones
-        difference = float(printed[1]) - float(printed[0])
-    signed = rounded(difference, unit)
-    signed = signed if signed[:1] == "-" or signed == "0" else f"+{signed}"
-    up = [is_of_up(declared(row["quantity"]), result) for result in results]
-    if not all(up):
-        printed = [
-            f"{text}{' facing up' * (facing and text != '-')}"
-            for text, facing in zip(printed, up, strict=True)
-        ]
-    scatters = [row[f"{side}_scatter"] for side in ("first", "second")]
-    both = (
-        " and ".join(
-            error_text(scatter, row["unit"]) for scatter in scatters if scatter is not None
+# --- text of results ----------------------------------------------------------------------------
+
+
+def _results_text(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]) -> list[str]:
+    """Paragraphs: numbers that differ, their errors, warnings of the runs, numbers that do not."""
+    differing_numbers = [number for number in numbers if number.differs]
+    same = [number.quantity for number in numbers if not number.differs]
+    paragraphs = []
+    if differing_numbers:
+        paragraphs += _table_of_numbers(differing_numbers, runs)
+    errors = _error_lines(differing_numbers, runs)
+    if errors:
+        paragraphs.append("\n".join(errors))
+    warnings = []
+    for run in runs:
+        warnings += [f"{run.name}: warning: {warning}" for warning in run.results.warnings]
+    if warnings:
+        paragraphs.append("\n".join(warnings))
+    if same and differing_numbers:
+        paragraphs.append(f"the same in both: {', '.join(same)}")
+    elif same:
+        paragraphs.append("all results are the same")
+    return paragraphs
+
+
+def _cycles_text(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]) -> str:
+    """``, but ran 20 and 40 cycles`` if the numbers of cycles differ; else an empty text."""
+    for number in numbers:
+        if number.quantity == "cycles" and number.differs:
+            first, second = _printed_values(number, runs)
+            return f", but ran {first} and {second} cycles"
+    return ""
+
+
+def _table_of_numbers(
+    numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]
+) -> list[str]:
+    """A table of numbers without empty columns, and what its scatter means if it has one."""
+    rows = [_cells(number, runs) for number in numbers]
+    names = [run.name for run in runs]
+    heads = ["result", *names, "difference", "scatter of copies", "numerical error"]
+    columns = []
+    for head, *cells in zip(heads, *rows, strict=True):
+        if set(cells) != {_DASH}:
+            columns.append((head, *cells))
+    paragraphs = [aligned(list(zip(*columns, strict=True)))]
+    if "scatter of copies" in [head for head, *_ in columns]:
+        paragraphs.append(
+            "scatter of copies: how much copies differ by their start; no error of the difference"
         )
-        or "-"
-    )
-    error = error_text(_number(row["numerical_error"]), row["unit"])
-    return [with_unit(row["quantity"], unit), *printed, signed, both, error]
+    return paragraphs
+
+
+def _cells(number: _ComparedNumber, runs: Sequence[_FinishedRun]) -> list[str]:
+    """A row of the table: label with unit, both values, difference, scatters, numerical error."""
+    unit, _ = unit_shown(number.unit)
+    return [
+        with_unit(number.quantity, unit),
+        *_printed_values(number, runs),
+        _signed_difference(number),
+        _scatters_text(number),
+        error_text(number.numerical_error, number.unit),
+    ]
+
+
+def _scatters_text(number: _ComparedNumber) -> str:
+    """The scatters that the two results have, in the displayed unit; a dash if none has one."""
+    scatters = []
+    for scatter in (number.first_scatter, number.second_scatter):
+        text = error_text(_number(scatter), number.unit)
+        if text != _DASH:
+            scatters.append(text)
+    if not scatters:
+        return _DASH
+    return " and ".join(scatters)
+
+
+def _printed_values(number: _ComparedNumber, runs: Sequence[_FinishedRun]) -> list[str]:
+    """Both values in the displayed unit.
+
+    If only one of them is a mean over the walkers that face up, the value says so.
+    """
+    unit, factor = unit_shown(number.unit)
+    texts = [rounded(factor * value, unit) for value in (number.first, number.second)]
+    facing_up = [is_of_up(declared(number.quantity), run.results) for run in runs]
+    if all(facing_up):
+        return texts
+    marked = []
+    for text, is_facing_up in zip(texts, facing_up, strict=True):
+        if is_facing_up and text != _DASH:
+            marked.append(f"{text} facing up")
+        else:
+            marked.append(text)
+    return marked
+
+
+def _signed_difference(number: _ComparedNumber) -> str:
+    """The difference in the displayed unit with its sign."""
+    unit, factor = unit_shown(number.unit)
+    first = factor * number.first
+    second = factor * number.second
+    difference = factor * number.difference
+    if abs(difference) < _HIDDEN_CHANGE * abs(first):
+        # Digits that are not printed would contradict the printed ones.
+        difference = float(rounded(second, unit)) - float(rounded(first, unit))
+    text = rounded(difference, unit)
+    if text == "0" or text.startswith("-"):
+        return text
+    return f"+{text}"
+
+
+def _error_lines(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]) -> list[str]:
+    """How certain the differences are.
+
+    How many times its numerical error a velocity differs; the bands of both runs, if their main
+    numbers differ; how to measure numerical errors that are missing.
+    """
+    number_by_name = {number.quantity: number for number in numbers}
+    velocities = [number_by_name[name] for name in _VELOCITIES if name in number_by_name]
+    lines = []
+    for number in velocities:
+        if isfinite(number.numerical_error) and number.numerical_error > 0.0:
+            times = error_text(abs(number.difference) / number.numerical_error, "")
+            lines.append(f"{number.quantity}: differs by {times} times its numerical error")
+    if any(headline(run.results) in number_by_name for run in runs):
+        lines += _band_lines(runs)
+    unmeasured = [run for run in runs if not_computed(run.results).numerical_error]
+    if velocities and unmeasured:
+        directories = " ".join(str(run.results.directory) for run in unmeasured)
+        lines.append(f"to measure numerical errors: walkers run {directories} --accuracy")
+    return lines
+
+
+def _band_lines(runs: Sequence[_FinishedRun]) -> list[str]:
+    """The band of each run, and the number of uncertain values on which both runs rest."""
+    lines = []
+    for run in runs:
+        band = _band_text(run.results)
+        if band:
+            lines.append(f"{run.name}: {band}")
+    shared = set.intersection(*[_uncertain_keys(run.results) for run in runs])
+    if shared:
+        belong = "belongs" if len(shared) == 1 else "belong"
+        values = f"{counted(len(shared), 'uncertain value')} {belong} to both runs"
+        lines.append(
+            f"{values} and may be equal in both: "
+            "the bands may overlap although the difference is certain"
+        )
+    return lines
+
+
+def _uncertain_keys(results: Results) -> set[str]:
+    """Keys of the uncertain values on which a result rests."""
+    return {value["key"] for value in results.about["rests_on"] if value["range"]}
+
+
+def _band_text(results: Results) -> str:
+    """The band of the main number of a run, or on how many uncertain values the number rests.
+
+    Empty if there is no band and no uncertain value.
+    """
+    main = headline(results)
+    if main:
+        quantity = declared(main)
+        band = band_of(results, quantity)
+        if band:
+            unit, _ = unit_shown(quantity.unit)
+            return f"{with_unit(main, unit)}, {band}"
+    if not not_computed(results).uncertain_values:
+        return ""
+    uncertain = [value["origin"] for value in results.about["rests_on"] if value["range"]]
+    rests = f"{main} rests on {counted(len(uncertain), 'uncertain value')}"
+    guessed = f"{uncertain.count('default')} guessed"
+    return f"{rests}, {guessed}; the band over the ranges is not computed (--spread)"
