@@ -1,7 +1,11 @@
-"""Summary of a case before it is run: values in SI units, forces, time step and cost."""
+"""Summary of a case before it is run: values in SI units, forces, time step and cost.
+
+Nothing is written, and no engine is started. The summary is JSON; `preview_text` makes text of it.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from math import acos, degrees, isfinite
 from typing import Any
@@ -21,133 +25,238 @@ from walkers.runner.process import cores_here
 from walkers.text import aligned, printable
 
 _LOOSE_PACKING = 0.55
-_FASTEST_CLIMB = (
-    12e-3  # m/s; none of about a hundred climbs in glycerol at the drive of the paper was faster
-)
+"""Share of the volume of a container that loosely packed beads fill."""
+_FASTEST_CLIMB = 12e-3
+"""m/s; none of about a hundred climbs in glycerol at the drive of the paper was faster."""
+_NEEDLESSLY_SHORT = 1e-2
+"""Time step over the longest recommended one, below which a note says so."""
+_LONGER_THAN_RECOMMENDED = 1.01
+"""Time step over the longest recommended one, above which a note says so."""
+_OBLIQUE = 1.0
+"""Angle of an opening to the horizontal, degrees, above which it is called oblique."""
+_LONGEST_IN_SECONDS = 120.0
+"""Longest predicted run time that is printed in seconds, s."""
+
+
+# --- notes --------------------------------------------------------------------------------------
 
 
 def notes(case: Case) -> list[str]:
-    """Notes on a case before it is run.
+    """What a user should know about a case before it is run.
 
-    About a long time step, heavy beads and few cores; of a pile, about beads of one size and low walls.
+    Notes are about a long time step, heavy beads, records and few cores; for piles also about beads
+    of a single size and about low walls.
     """
-    largest, reason = limits_of(case).recommended(loose=case.loose)
-    times, lines = case.run.time_step / largest, []
-    if times < 1e-2:
-        lines = [
-            f"the time step is {_two_digits(1.0 / times)} times smaller than needed ({reason})"
-        ]
-    elif times > 1.01:
-        lines = [f"the time step is {times:.2g} times the largest of auto ({reason})"]
+    lines = _time_step_notes(case)
     lines += gravity_warnings(case)
     if case.excitation.record:
         lines += case.excitation.record.notes
-    if case.run.ranks > (cores := cores_here()):
-        share = f"{case.run.ranks} MPI processes (run.ranks) share {counted(cores, 'core')} of this machine"
-        lines.append(f"{share}: the run takes many times longer than predicted")
-    if not (case.loose and case.boundary.closed and case.mixture):
-        return lines
-    numbers = {"large": case.large, "small": case.count - case.large}
-    lines += [
-        f"no {name} beads; in the paper, large beads lead small ones"
-        for name in numbers
-        if not numbers[name]
-    ]
-    filled = _volume(case) / (_LOOSE_PACKING * case.boundary.geometry.cross_section)
-    room = 2.0 * case.boundary.inner_height - filled
-    if not case.run.until and (fastest := room / case.duration) < _FASTEST_CLIMB:
-        end = "rise above twice boundary.height, and end the run early"
-        lines.append(f"climbers faster than {fastest * 1e3:.1f} mm/s {end}")
+    cores = cores_here()
+    if case.run.ranks > cores:
+        processes = f"{case.run.ranks} MPI processes (run.ranks)"
+        lines.append(
+            f"{processes} share {counted(cores, 'core')} of this machine: "
+            "the run takes many times longer than predicted"
+        )
+    if case.loose and case.boundary.closed and case.mixture:
+        lines += _pile_notes(case)
+    return lines
+
+
+def _time_step_notes(case: Case) -> list[str]:
+    """A note on a time step that is much shorter than needed, or longer than ``"auto"`` allows."""
+    longest, reason = limits_of(case).recommended(loose=case.loose)
+    ratio = case.run.time_step / longest
+    if ratio < _NEEDLESSLY_SHORT:
+        return [f"the time step is {_two_digits(1.0 / ratio)} times smaller than needed ({reason})"]
+    if ratio > _LONGER_THAN_RECOMMENDED:
+        return [f"the time step is {ratio:.2g} times the largest of auto ({reason})"]
+    return []
+
+
+def _pile_notes(case: Case) -> list[str]:
+    """Notes on a pile of beads of a single size, and on climbers that may rise over the walls."""
+    lines = []
+    counts = {"large": case.large, "small": case.count - case.large}
+    for size, count in counts.items():
+        if count == 0:
+            lines.append(f"no {size} beads; in the paper, large beads lead small ones")
+    cross_section = case.boundary.geometry.cross_section
+    pile_height = _volume(case) / (_LOOSE_PACKING * cross_section)
+    free_height = 2.0 * case.boundary.inner_height - pile_height
+    if not case.run.until:
+        speed = free_height / case.duration
+        if speed < _FASTEST_CLIMB:
+            end = "rise above twice boundary.height, and end the run early"
+            lines.append(f"climbers faster than {speed * 1e3:.1f} mm/s {end}")
     return lines
 
 
 def _two_digits(number: float) -> str:
-    return f"{float(f'{number:.2g}'):,.0f}"
+    """A number rounded to two significant digits, with commas between thousands."""
+    rounded = float(f"{number:.2g}")
+    return f"{rounded:,.0f}"
 
 
 def _volume(case: Case) -> float:
     """Volume of all beads, m³."""
-    return sum(map(bead_volume, case.all_radii))
+    return sum(bead_volume(radius) for radius in case.all_radii)
+
+
+# --- summary ------------------------------------------------------------------------------------
 
 
 def summarise(case: Case) -> dict[str, Any]:
-    """Everything that ``walkers show`` prints, SI units.
+    """Everything that ``walkers show`` prints, as JSON in SI units.
 
     Returns
     -------
     dict
-        ``case`` (resolved), ``drive`` (its largest harmonic, the sum of all), ``beads`` (numbers, mass, liquid),
-        ``dimer`` (M, R̄, Γ0, sin δ, mass asymmetry; of dimers),
-        ``vessel`` (numbers of its planes, triangles and faces; whether it is open; extent of the opening and
-        direction out of it; height; volume), ``contacts`` (forces, bridges, overlaps of each make of walkers),
-        ``time_step`` (limits, None if one does not apply; the chosen step; its shares of the limits and those of
-        ``"auto"``), ``run`` (steps, samples, predicted
-        seconds).
+        ``case``
+            The resolved case, with the origins of its values.
+        ``drive``
+            Peak acceleration, amplitude and peak velocity.
+        ``beads``
+            Numbers, mass, volume, liquid; the reduced over the real Young's modulus.
+        ``notes``
+            Texts (`notes`).
+        ``contacts``
+            Forces, bridges and overlaps at rest, for each kind of walkers.
+        ``time_step``
+            The step, the limits (None if one does not apply), the shares of the limits that the
+            step has, and the largest shares of ``"auto"``.
+        ``run``
+            Steps, samples, segments, predicted seconds.
+        ``vessel``
+            Of a vessel: numbers of its planes, triangles and faces; whether it is open; extent of
+            the opening and direction out of it; height; volume.
+        ``dimer``
+            Of dimers: masses, mean radius, sin δ, mass asymmetry, Γ0.
     """
-    run, drive, limits = case.run, case.excitation, vars(limits_of(case))
-    volume = _volume(case)
-    modulus = (
-        library_of(case.document)
-        .numbers("materials", case.beads.material or "")
-        .get("youngs_modulus")
-    )
+    drive = case.excitation
+    origins = [asdict(origin) for origin in case.origins]
+    contacts = []
+    for walkers in case.walkers:
+        contacts += _contacts(case, walkers)
     summary: dict[str, Any] = {
-        "case": {**case.as_dict(), "origins": [asdict(origin) for origin in case.origins]},
+        "case": {**case.as_dict(), "origins": origins},
         "drive": {
-            name: getattr(drive, name)
-            for name in ("peak_acceleration", "amplitude", "peak_velocity")
+            "peak_acceleration": drive.peak_acceleration,
+            "amplitude": drive.amplitude,
+            "peak_velocity": drive.peak_velocity,
         },
-        "beads": {
-            "small": case.count - case.large,
-            "large": case.large,
-            "mass": volume * case.beads.density,
-            "volume": volume,
-            "liquid": _liquid(case, volume),
-            "stiffness_ratio": modulus
-            and case.contact.youngs_modulus / parse_quantity(modulus.written, MODULUS),
-        },
+        "beads": _beads(case),
         "notes": notes(case),
-        "contacts": [contact for walkers in case.walkers for contact in _contacts(case, walkers)],
-        "time_step": {
-            "step": run.time_step,
-            "limits": {name: limit if isfinite(limit) else None for name, limit in limits.items()},
-            "share": {name: run.time_step / limit for name, limit in limits.items()},
-            "auto": dict(FRACTIONS[case.loose]),
-        },
-        "run": {
-            "steps_per_cycle": run.steps_per_cycle,
-            "steps": run.steps,
-            "simulated_seconds": run.steps * run.time_step,
-            "samples": run.steps // run.steps_per_sample + 1,
-            "until_steady": run.until_steady,
-            "segments": -(-run.cycles // run.cycles_per_segment),
-            "predicted_seconds": PROGRAM_SECONDS
-            + predicted_seconds(case)
-            + predicted_overhead([case]),
-        },
+        "contacts": contacts,
+        "time_step": _time_step(case),
+        "run": _run(case),
     }
     if case.boundary.shape == "vessel":
         summary["vessel"] = _vessel(case)
     if case.walkers and len(case.walkers[0].radii) == 2:
-        dimer = dimer_of(case)
-        numbers = ("total_mass", "mean_radius", "sin_delta", "mass_asymmetry")
-        summary["dimer"] = {name: getattr(dimer, name) for name in numbers}
-        summary["dimer"] |= {
-            "masses": list(dimer.masses),
-            "gamma0": dimer.gamma0(drive.peak_acceleration),
-        }
+        summary["dimer"] = _dimer(case)
     return summary
 
 
+def _beads(case: Case) -> dict[str, Any]:
+    """Numbers, mass (kg) and volume (m³) of the beads, their liquid (m³), and their softness."""
+    volume = _volume(case)
+    materials = library_of(case.document).numbers("materials", case.beads.material or "")
+    modulus = materials.get("youngs_modulus")
+    stiffness_ratio = None
+    if modulus is not None:
+        real_modulus = parse_quantity(modulus.written, MODULUS)
+        stiffness_ratio = case.contact.youngs_modulus / real_modulus
+    return {
+        "small": case.count - case.large,
+        "large": case.large,
+        "mass": volume * case.beads.density,
+        "volume": volume,
+        "liquid": _liquid(case, volume),
+        "stiffness_ratio": stiffness_ratio,
+    }
+
+
+def _liquid(case: Case, volume: float) -> float:
+    """Volume of the liquid, m³, with the ``volume`` of all beads.
+
+    It is the liquid on all beads, or, if their menisci are given, that in the bridges of the
+    walkers.
+    """
+    if case.liquid.meniscus_radius is None:
+        return volume * case.liquid.of_bridges.volume_fraction
+    liquid = 0.0
+    for walkers in case.walkers:
+        for load in contact_loads(case, walkers):
+            liquid += load.surfaces.volume * walkers.replicates
+    return liquid
+
+
+def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
+    """Contacts of a walker at rest: each bead on the substrate, then each pair of beads.
+
+    Bridge volume in m³, forces in N, rupture distance and overlap in m.
+    """
+    tension = case.liquid.surface_tension
+    names = []
+    limits: list[float | None] = []
+    for bead, radius in enumerate(walkers.radii, 1):
+        names.append(f"bead {bead} on substrate")
+        limits.append(capillary_force_limit_at_wall(tension, radius))
+    for first, second in walkers.pairs:
+        names.append(f"bead {second + 1} on bead {first + 1}")
+        limits.append(None)
+    loads = contact_loads(case, walkers)
+    contacts = []
+    for name, load, limit in zip(names, loads, limits, strict=True):
+        contact = {
+            "contact": name,
+            "bridge_volume": load.surfaces.volume,
+            "capillary_force": load.pull,
+            "capillary_force_limit": limit,
+            "rupture_distance": load.rupture,
+            "overlap_at_rest": load.overlap,
+        }
+        contacts.append(contact)
+    return contacts
+
+
+def _time_step(case: Case) -> dict[str, Any]:
+    """The time step and its limits in s, and the shares of the limits."""
+    step = case.run.time_step
+    limits = vars(limits_of(case))
+    return {
+        "step": step,
+        "limits": {name: limit if isfinite(limit) else None for name, limit in limits.items()},
+        "share": {name: step / limit for name, limit in limits.items()},
+        "auto": dict(FRACTIONS[case.loose]),
+    }
+
+
+def _run(case: Case) -> dict[str, Any]:
+    """Length and predicted cost of the run; times in s."""
+    run = case.run
+    seconds = PROGRAM_SECONDS + predicted_seconds(case) + predicted_overhead([case])
+    return {
+        "steps_per_cycle": run.steps_per_cycle,
+        "steps": run.steps,
+        "simulated_seconds": run.steps * run.time_step,
+        "samples": run.steps // run.steps_per_sample + 1,
+        "until_steady": run.until_steady,
+        "segments": -(-run.cycles // run.cycles_per_segment),
+        "predicted_seconds": seconds,
+    }
+
+
 def _vessel(case: Case) -> dict[str, Any]:
-    """The vessel of the user's own: its walls, opening (m), height (m) and volume (m³)."""
+    """A vessel: its walls, opening (m), height (m) and volume (m³)."""
     vessel = case.boundary.vessel
     mesh = case.document.get("meshes", {}).get(case.boundary.mesh or "")
     return {
         "planes": len(case.boundary.planes),
         "triangles": len(vessel.triangles),
         "triangles_of_file": len(mesh["triangles"]) if mesh else None,
-        "faces": len({*vessel.faces.tolist()}),
+        "faces": len(set(vessel.faces.tolist())),
         "open": bool(vessel.rims),
         "opening": list(vessel.opening),
         "facing": vessel.facing.tolist(),
@@ -156,149 +265,183 @@ def _vessel(case: Case) -> dict[str, Any]:
     }
 
 
-def _text_of_vessel(vessel: dict[str, Any]) -> str:
-    """Walls, opening, height and volume of a vessel as text."""
+def _dimer(case: Case) -> dict[str, Any]:
+    """Masses (kg), mean radius (m) and numbers without a unit of the first dimers of a case."""
+    dimer = dimer_of(case)
+    return {
+        "total_mass": dimer.total_mass,
+        "mean_radius": dimer.mean_radius,
+        "sin_delta": dimer.sin_delta,
+        "mass_asymmetry": dimer.mass_asymmetry,
+        "masses": list(dimer.masses),
+        "gamma0": dimer.gamma0(case.excitation.peak_acceleration),
+    }
+
+
+# --- text ---------------------------------------------------------------------------------------
+
+
+def preview_text(summary: Mapping[str, Any]) -> str:
+    """The summary of `summarise` as text, in usual units."""
+    gravity = summary["case"]["environment"]["gravity"]
+    lines = _text_of_case(summary["case"])
+    lines.append(_text_of_beads(summary["beads"]))
+    if "vessel" in summary:
+        lines.append(_text_of_vessel(summary["vessel"]))
+    if "dimer" in summary:
+        lines += _text_of_dimer(summary["dimer"], gravity)
+    lines.append(_text_of_drive(summary["drive"], gravity))
+    if summary["contacts"]:
+        lines.append(_text_of_contacts(summary["contacts"]))
+    lines += _text_of_time_step(summary["time_step"], summary["run"]["steps_per_cycle"])
+    lines.append(_text_of_run(summary["run"]))
+    lines += [f"note       {note}" for note in summary["notes"]]
+    return "\n".join(lines)
+
+
+def _text_of_case(case: Mapping[str, Any]) -> list[str]:
+    """A resolved case, a line for each value: key, value as in a case file, and origin."""
+    lines = [printable(f"{case['name']}: {case['title']}").rstrip(": ")]
+    current_table = None
+    for origin in case["origins"]:
+        table, _, key = origin["key"].rpartition(".")
+        if table != current_table:
+            lines.append(f"  [{table}]")
+            current_table = table
+        lines.append(f"    {key:24} {origin['text']:24} {_origin_text(origin)}".rstrip())
+    return lines
+
+
+def _origin_text(value: Mapping[str, Any]) -> str:
+    """Origin of a value as text, such as ``library: …`` or ``guessed (not measured), …``."""
+    origin = str(value["origin"])
+    source = str(value["source"])
+    limits = ""
+    if value["range"]:
+        low, high = value["range"]
+        limits = f"range {low} to {high}"
+    if origin == "default" and limits and not value["uncertain"]:
+        return f"guessed ({source or 'not measured'}), general {limits}"
+    if origin in ("calibrated", "assumed"):
+        text = source
+    elif source:
+        text = f"{origin}: {source}"
+    else:
+        text = origin
+    if value["uncertain"]:
+        text += ", uncertain"
+    if limits:
+        text += f", {limits}"
+    return text
+
+
+def _text_of_beads(beads: Mapping[str, Any]) -> str:
+    """Numbers, mass, volume and liquid of the beads, and how much softer than real they are."""
+    numbers = f"{beads['small']} small and {beads['large']} large, {beads['mass'] * 1e6:.4g} mg"
+    volumes = f"{beads['volume'] * 1e9:.4g} µL with {beads['liquid'] * 1e9:.3g} µL of liquid"
+    text = f"beads      {numbers}, {volumes}"
+    ratio = beads["stiffness_ratio"]
+    if ratio and ratio < 1:
+        factor = _two_digits(1.0 / ratio)
+        text += f"; Young's modulus of the beads reduced by a factor of {factor}"
+    return text
+
+
+def _text_of_vessel(vessel: Mapping[str, Any]) -> str:
+    """Walls, opening, height and volume of a vessel."""
     if vessel["planes"]:
         walls = counted(vessel["planes"], "plane")
     else:
         walls = f"{counted(vessel['triangles'], 'triangle')} in {counted(vessel['faces'], 'face')}"
-    of_file = vessel["triangles_of_file"]
-    if of_file is not None and of_file != vessel["triangles"]:
-        walls += f" (the mesh has {of_file} triangles)"
-    size = f"{1e3 * vessel['height']:.4g} mm high"
+    triangles_of_file = vessel["triangles_of_file"]
+    if triangles_of_file is not None and triangles_of_file != vessel["triangles"]:
+        walls += f" (the mesh has {triangles_of_file} triangles)"
+    height = f"{1e3 * vessel['height']:.4g} mm high"
     volume = f"{1e6 * vessel['volume']:.3g} cm³"
     if not vessel["open"]:
-        return f"vessel     {walls}, closed: beads are within this surface, {size}, {volume} inside"
+        within = "beads are within this surface"
+        return f"vessel     {walls}, closed: {within}, {height}, {volume} inside"
     x, y = (f"{1e3 * extent:.3g}" for extent in vessel["opening"])
+    opening = f"open toward +z, {x} mm × {y} mm wide"
     tilt = degrees(acos(min(1.0, vessel["facing"][2])))
-    oblique = f", oblique by {tilt:.2g}°" if tilt > 1.0 else ""
-    return f"vessel     {walls}, open toward +z, {x} mm × {y} mm wide{oblique}, {size}, {volume}"
+    if tilt > _OBLIQUE:
+        opening += f", oblique by {tilt:.2g}°"
+    return f"vessel     {walls}, {opening}, {height}, {volume}"
 
 
-def _liquid(case: Case, volume: float) -> float:
-    """Volume of the liquid on all beads, or, if their menisci give it, in the bridges of the walkers, m³."""
-    if case.liquid.meniscus_radius is None:
-        return volume * case.liquid.of_bridges.volume_fraction
-    loads = (
-        (load, walkers.replicates)
-        for walkers in case.walkers
-        for load in contact_loads(case, walkers)
-    )
-    return sum(load.surfaces.volume * replicates for load, replicates in loads)
-
-
-def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
-    """Loads of the contacts of a walker at rest."""
-    contacts = [f"bead {bead} on substrate" for bead, _ in enumerate(walkers.radii, 1)]
-    contacts += [f"bead {second + 1} on bead {first + 1}" for first, second in walkers.pairs]
-    planes = [
-        capillary_force_limit_at_wall(case.liquid.surface_tension, radius)
-        for radius in walkers.radii
+def _text_of_dimer(dimer: Mapping[str, Any], gravity: float) -> list[str]:
+    """Mass, weight, geometry and Γ0 of a dimer."""
+    mass = dimer["total_mass"]
+    parts = [
+        f"M = {mass * 1e6:.4g} mg",
+        f"weight {mass * gravity * 1e6:.4g} µN",
+        f"mean radius {dimer['mean_radius'] * 1e3:.4g} mm",
+        f"sin δ = {dimer['sin_delta']:.4g}",
+        f"mass asymmetry (m1 - m2)/M = {dimer['mass_asymmetry']:.4g}",
+        f"Γ0 = {dimer['gamma0']:.4g}",
     ]
-    limits = [*planes, *(None for _ in walkers.pairs)]
-    return [
-        {
-            "contact": contact,
-            "bridge_volume": load.surfaces.volume,
-            "capillary_force": load.pull,
-            "capillary_force_limit": limit,
-            "rupture_distance": load.rupture,
-            "overlap_at_rest": load.overlap,
-        }
-        for contact, load, limit in zip(contacts, contact_loads(case, walkers), limits, strict=True)
-    ]
-
-
-def preview_text(summary: dict[str, Any]) -> str:
-    """The summary as text."""
-    beads, drive, dimer = summary["beads"], summary["drive"], summary.get("dimer")
-    ratio, gravity = beads["stiffness_ratio"], summary["case"]["environment"]["gravity"]
-    factor = _two_digits(1.0 / ratio) if ratio and ratio < 1 else ""
-    softened = f"; Young's modulus of the beads reduced by a factor of {factor}" if factor else ""
-    lines = [
-        *_text_of_case(summary["case"]),
-        f"beads      {beads['small']} small and {beads['large']} large, {beads['mass'] * 1e6:.4g} mg, "
-        f"{beads['volume'] * 1e9:.4g} µL with {beads['liquid'] * 1e9:.3g} µL of liquid{softened}",
-    ]
-    if vessel := summary.get("vessel"):
-        lines.append(_text_of_vessel(vessel))
-    if dimer:
-        lines.append(
-            f"dimer      M = {dimer['total_mass'] * 1e6:.4g} mg, weight {dimer['total_mass'] * gravity * 1e6:.4g} µN, "
-            f"mean radius {dimer['mean_radius'] * 1e3:.4g} mm, "
-            f"sin δ = {dimer['sin_delta']:.4g}, mass asymmetry (m1 - m2)/M = {dimer['mass_asymmetry']:.4g}, "
-            f"Γ0 = {dimer['gamma0']:.4g}"
-        )
-        if dimer["sin_delta"] < 0:
-            lines.append("           bead 1 is the smaller bead")
-    lines.append(
-        f"drive      a0 = {drive['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g "
-        f"(g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {gravity:g} m/s²), "
-        f"amplitude {drive['amplitude'] * 1e3:.4g} mm, peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
-    )
-    rows = [
-        [
-            "contact",
-            "capillary force",
-            "4πγR of a plane",
-            "bridge volume",
-            "rupture gap",
-            "overlap at rest",
-        ]
-    ]
-    for contact in summary["contacts"]:
-        limit = contact["capillary_force_limit"]
-        cells = [
-            f"{contact['capillary_force'] * 1e6:.4g} µN",
-            f"{limit * 1e6:.4g} µN" if limit else "-",
-        ]
-        cells += [
-            f"{contact['bridge_volume'] * 1e12:.3g} nL",
-            f"{contact['rupture_distance'] * 1e6:.3g} µm",
-        ]
-        rows.append(
-            [f"  {contact['contact']}", *cells, f"{contact['overlap_at_rest'] * 1e9:.4g} nm"]
-        )
-    lines += [aligned(rows, right=range(1, 6))] if summary["contacts"] else []
-    notes = [f"note       {note}" for note in summary["notes"]]
-    return "\n".join([*lines, *_text_of_run(summary["time_step"], summary["run"]), *notes])
-
-
-def _text_of_case(case: dict[str, Any]) -> list[str]:
-    """A resolved case, one line per value: key, value in the units of a case file, and origin."""
-    lines, table = [printable(f"{case['name']}: {case['title']}").rstrip(": ")], None
-    for value in case["origins"]:
-        within, _, key = value["key"].rpartition(".")
-        if within != table:
-            table = within
-            lines.append(f"  [{table}]")
-        lines.append(f"    {key:24} {value['text']:24} {_origin_text(value)}".rstrip())
+    lines = [f"dimer      {', '.join(parts)}"]
+    if dimer["sin_delta"] < 0:
+        lines.append("           bead 1 is the smaller bead")
     return lines
 
 
-def _origin_text(value: dict[str, Any]) -> str:
-    """Origin of a value as text."""
-    origin, source = str(value["origin"]), str(value["source"])
-    ends = f", range {value['range'][0]} to {value['range'][1]}" if value["range"] else ""
-    if origin == "default" and ends and not value["uncertain"]:
-        return f"guessed ({source or 'not measured'}){ends.replace('range', 'general range')}"
-    ends = f", uncertain{ends}" if value["uncertain"] else ends
-    if origin in ("calibrated", "assumed"):
-        return source + ends
-    return (f"{origin}: {source}" if source else origin) + ends
+def _text_of_drive(drive: Mapping[str, Any], gravity: float) -> str:
+    """Peak acceleration, amplitude and peak velocity of the walls."""
+    acceleration = f"a0 = {drive['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g"
+    unit = f"g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {gravity:g} m/s²"
+    amplitude = f"amplitude {drive['amplitude'] * 1e3:.4g} mm"
+    velocity = f"peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
+    return f"drive      {acceleration} ({unit}), {amplitude}, {velocity}"
 
 
-def _text_of_run(step: dict[str, Any], run: dict[str, Any]) -> list[str]:
-    """The time step against its limits, the length of the run and its cost."""
-    lines = [f"time step  {step['step'] * 1e6:.5g} µs, {run['steps_per_cycle']} per cycle"]
-    for name, limit in step["limits"].items():
-        shown = f"{limit * 1e6:.4g} µs" if limit is not None else "none"
-        share = f'{step["share"][name]:.3f} of the limit ("auto": at most {step["auto"][name]:g})'
-        lines.append(f"  {name:10} limit {shown:>10}; time step = {share}")
+def _text_of_contacts(contacts: list[Mapping[str, Any]]) -> str:
+    """A table of the contacts of walkers at rest."""
+    heads = [
+        "contact",
+        "capillary force",
+        "4πγR of a plane",
+        "bridge volume",
+        "rupture gap",
+        "overlap at rest",
+    ]
+    rows = [heads]
+    for contact in contacts:
+        limit = contact["capillary_force_limit"]
+        cells = [
+            f"  {contact['contact']}",
+            f"{contact['capillary_force'] * 1e6:.4g} µN",
+            f"{limit * 1e6:.4g} µN" if limit else "-",
+            f"{contact['bridge_volume'] * 1e12:.3g} nL",
+            f"{contact['rupture_distance'] * 1e6:.3g} µm",
+            f"{contact['overlap_at_rest'] * 1e9:.4g} nm",
+        ]
+        rows.append(cells)
+    return aligned(rows, right=range(1, len(heads)))
+
+
+def _text_of_time_step(time_step: Mapping[str, Any], steps_per_cycle: int) -> list[str]:
+    """The time step against its limits."""
+    lines = [f"time step  {time_step['step'] * 1e6:.5g} µs, {steps_per_cycle} per cycle"]
+    for name, limit in time_step["limits"].items():
+        limit_text = "none" if limit is None else f"{limit * 1e6:.4g} µs"
+        share = f"{time_step['share'][name]:.3f} of the limit"
+        auto = f'"auto": at most {time_step["auto"][name]:g}'
+        lines.append(f"  {name:10} limit {limit_text:>10}; time step = {share} ({auto})")
+    return lines
+
+
+def _text_of_run(run: Mapping[str, Any]) -> str:
+    """The length of the run and its cost."""
+    length = f"{run['steps']} steps, {run['simulated_seconds']:.4g} s simulated"
+    if run["segments"] > 1:
+        length += f" in {run['segments']} segments"
+    length += f", {run['samples']} samples"
+    if run["until_steady"]:
+        end = f"ends when the velocity is constant within {percent(CONSTANT)}"
+        length = f"at most {length}; {end}"
     seconds = run["predicted_seconds"]
-    cost = f"{seconds:.1f} s" if seconds < 120.0 else f"{seconds / 60.0:.1f} min"
-    segments = f" in {run['segments']} segments" if run["segments"] > 1 else ""
-    most = "at most " if run["until_steady"] else ""
-    end = f"; ends when the velocity is constant within {percent(CONSTANT)}" if most else ""
-    simulated = f"{run['steps']} steps, {run['simulated_seconds']:.4g} s simulated{segments}, {run['samples']} samples"
-    return [*lines, f"run        {most}{simulated}{end}; predicted run time {cost}"]
+    cost = f"{seconds:.1f} s"
+    if seconds >= _LONGEST_IN_SECONDS:
+        cost = f"{seconds / 60.0:.1f} min"
+    return f"run        {length}; predicted run time {cost}"
