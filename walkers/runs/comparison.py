@@ -196,7 +196,7 @@ def _has_other_bridge_tables(side: Side) -> bool:
     return bool(tables != bridge_tables_digest(side.case))
 
 
-# --- numbers ------------------------------------------------------------------------------------
+# --- numbers --------------------------------------------------------------------------------------
 
 
 def _compared_numbers(first: Results, second: Results) -> list[_ComparedNumber]:
@@ -258,7 +258,7 @@ def _number(value: Any) -> float:
     return float(value)
 
 
-# --- text of results ----------------------------------------------------------------------------
+# --- text of results ------------------------------------------------------------------------------
 
 
 def _results_text(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]) -> list[str]:

@@ -1,11 +1,15 @@
 """Make runs: single runs segment by segment, or several at once in a shared deck.
 
-A run is made in ``NAME-HASH.incomplete``. Its segments are ``segments/0000``, ``segments/0001``, …; each begins with
-the restart file of the one before. A segment is called ``0003.new`` until it is complete. An interrupted run continues
-after its last segment. Segments do not depend on interruptions, so the results are bit-identical.
+A run is made in ``NAME-HASH.incomplete``. Its segments are ``segments/0000``, ``segments/0001``,
+…; each begins with the restart file of the one before. A segment is called ``0003.new`` until it
+is complete. An interrupted run continues after its last segment. Segments do not depend on
+interruptions, so the results are bit-identical.
 
-A shared deck runs in the ``….incomplete`` of its first run. Its output is split into the run directories. These are
-like any others, but contain the deck and the engine's log in ``shared_deck``.
+A shared deck runs in the ``….incomplete`` of its first run. Its output is split into the run
+directories. These are like any others, but contain the deck and the engine's log in
+``shared_deck``.
+
+Which runs to make is decided in `walkers.sweeps`; how a single deck is run, in `walkers.runner`.
 """
 
 from __future__ import annotations
@@ -41,7 +45,8 @@ _LEAST_BYTES = 150
 """Smallest size of a complete restart file per atom; measured: 300 to 580."""
 _RMS_VELOCITY = re.compile(rb"^root mean square velocity (\S+)", re.MULTILINE)
 """Mass-weighted velocity of the beads, m/s, which decks print while the beads settle."""
-_STARTING_SECONDS = 1.0  # before that the start of the engine dominates the rate
+_STARTING_SECONDS = 1.0
+"""Time after which the speed of the engine is told, s; before, its start dominates the speed."""
 
 
 class DamagedSegment(WalkersError):
@@ -49,10 +54,32 @@ class DamagedSegment(WalkersError):
 
 
 class BridgeTablesDiffer(WalkersError):
-    """The complete segments of an unfinished run have other bridge tables than the next one would have."""
+    """The complete segments of an unfinished run have other bridge tables than the next one."""
 
 
-def make_runs(
+@dataclass(frozen=True)
+class _LaunchOptions:
+    """How the engine is started and watched.
+
+    Attributes
+    ----------
+    engine
+        The engine.
+    locks
+        File descriptors of the locks of the runs, which the engine inherits.
+    on_progress
+        Is called a few times per second.
+    time_limit
+        Wall time of a segment or a shared deck, s; None: no limit.
+    """
+
+    engine: Engine
+    locks: Sequence[int]
+    on_progress: Tell | None
+    time_limit: float | None
+
+
+def make_runs(  # noqa: PLR0913
     cases: Sequence[Case],
     out: Path,
     engine: Engine,
@@ -62,79 +89,113 @@ def make_runs(
     on_progress: Tell | None = None,
     time_limit: float | None = None,
 ) -> dict[str, bool]:
-    """Make the missing runs of cases that may share a deck, and measure them; a single run continues.
+    """Make the missing runs of cases, and measure them.
 
-    `EngineFailure` if the engine fails. Nothing is left of a shared deck; its cases must be tried again in smaller
-    decks. With ``force`` all runs are made again; without ``dumps`` those that are made keep none. The ``time_limit``
-    is the wall time in s of a segment. Returns the finished runs by name, and whether this call made them; without
-    those that another process makes.
+    A single run continues where it was interrupted. Several runs are made in a shared deck.
+
+    Parameters
+    ----------
+    cases
+        One case, or several that may share a deck.
+    out
+        Folder of the run directories.
+    engine
+        The engine.
+    force
+        Make all runs again.
+    dumps
+        Whether the runs that are made keep their dumps.
+    on_progress
+        Is called a few times per second.
+    time_limit
+        Wall time of a segment, s.
+
+    Returns
+    -------
+    dict
+        The finished runs by name, and whether this call made them. Runs that another process makes
+        are left out.
+
+    Raises
+    ------
+    EngineFailure
+        If the engine fails. Nothing is left of a shared deck: its cases must be tried again in
+        smaller decks.
     """
     make_folder(out)
     places = {run_directory.run_place(case, engine, out): case for case in cases}
+    runs: dict[str, bool] = {}
+    missing: dict[Path, Case] = {}
     with run_directory.locked(places) as ours:
         for place in ours:
             run_directory.recover(place)
-        runs = (
-            {}
-            if force
-            else {place.name: False for place in places if run_directory.is_finished(place)}
-        )
-        missing = {
-            place: case
-            for place, case in places.items()
-            if place in ours and place.name not in runs
-        }
+        for place, case in places.items():
+            if run_directory.is_finished(place) and not force:
+                runs[place.name] = False
+            elif place in ours:
+                missing[place] = case
         locks = [ours[place] for place in missing]
+        options = _LaunchOptions(engine, locks, on_progress, time_limit)
         if len(missing) == 1:
             ((place, case),) = missing.items()
-            with open_locked(case, engine, place, locks, anew=force) as opened:
-                opened.make(on_progress=on_progress, time_limit=time_limit)
-                if on_progress is not None:
-                    on_progress(Progress(1.0, "measuring"))
-                measure(opened.directory)
-                opened.finish()
-            runs[place.name] = True
-        elif missing:
-            left = {place.name: case for place, case in missing.items()}
-            for cycles in next(iter(left.values())).run.attempts:
-                if left:
-                    done = _make_together(left, cycles, out, engine, locks, on_progress, time_limit)
-                    runs |= dict.fromkeys(done, True)
-                left = {name: case for name, case in left.items() if name not in runs}
-        for place in missing if not dumps else ():
-            if place.name in runs:
-                run_directory.leave_out_dumps(place)
+            _make_alone(case, place, options, anew=force)
+            made = [place.name]
+        else:
+            made = _make_in_shared_decks(missing, out, options)
+        for name in made:
+            runs[name] = True
+            if not dumps:
+                run_directory.leave_out_dumps(out / name)
     return runs
 
 
-def progress_at(place: Path, case: Case | None = None) -> Progress | None:
-    """Progress of a run from its files, or of the shared deck whose first run has this place; None at the start.
+# --- progress -------------------------------------------------------------------------------------
 
-    The case is read as well, unless it is given.
+
+def progress_at(place: Path, case: Case | None = None) -> Progress | None:
+    """Progress of an unfinished run from its files, or of the shared deck whose first run it is.
+
+    Parameters
+    ----------
+    place
+        The final directory of the run.
+    case
+        Its case; None: it is read.
+
+    Returns
+    -------
+    Progress or None
+        None if the engine has not started, or if the files cannot be read.
     """
     directory = run_directory.unfinished(place)
     shared = directory / DECK_FOLDER
     try:
         if shared.is_dir():
-            share = last_step(shared / decks.OUTPUT_NAME) / run_directory.read_layout(shared).steps
-            percent = f"{100 * share:.0f} %"
-            return Progress(share, percent, percent)
-        case = case or run_directory.case_of(directory)
-        done = [_read_segment(path) for path in run_directory.segment_directories(directory)]
-        (folder,) = (directory / run_directory.SEGMENTS).glob("*.new")
-        run = case.run
-        cycles = (
-            run_directory.read_layout(folder).steps // run.steps_per_cycle
-            if run.until_steady
-            else run.cycles
-        )
-        begin = int(done[-1]["end"]) if done else 0
-        start = run_directory.drive_from(case, done)
-        step = max(begin, last_step(folder / decks.OUTPUT_NAME))
-        seconds = time.time() - (folder / decks.DECK_NAME).stat().st_mtime
+            return _progress_of_shared_deck(shared)
+        return _progress_of_segment(directory, case or run_directory.case_of(directory))
     except (OSError, ValueError, KeyError, TypeError, WalkersError):
         return None
-    return progress_in(run, cycles, Segment(begin, begin, start), step, seconds)
+
+
+def _progress_of_shared_deck(folder: Path) -> Progress:
+    share = last_step(folder / decks.OUTPUT_NAME) / run_directory.read_layout(folder).steps
+    percent = f"{100 * share:.0f} %"
+    return Progress(share, percent, percent)
+
+
+def _progress_of_segment(directory: Path, case: Case) -> Progress:
+    """Progress of a run whose segments are made one by one; `ValueError` if none is being made."""
+    done = [_read_segment(path) for path in run_directory.segment_directories(directory)]
+    (folder,) = (directory / run_directory.SEGMENTS).glob("*.new")
+    run = case.run
+    cycles = run.cycles
+    if run.until_steady:
+        cycles = run_directory.read_layout(folder).steps // run.steps_per_cycle
+    begin = int(done[-1]["end"]) if done else 0
+    segment = Segment(begin, begin, run_directory.drive_from(case, done))
+    step = max(begin, last_step(folder / decks.OUTPUT_NAME))
+    seconds = time.time() - (folder / decks.DECK_NAME).stat().st_mtime
+    return progress_in(run, cycles, segment, step, seconds)
 
 
 def share_kept(place: Path) -> float | None:
@@ -170,41 +231,83 @@ def share_kept(place: Path) -> float | None:
 def progress_in(
     run: RunSettings, cycles: int, segment: Segment, step: int, seconds: float
 ) -> Progress:
-    """Progress at a step of a segment, ``seconds`` after its begin, in the attempt with a number of cycles."""
-    before, steps, start = (
-        run.steps_until(cycles - 1),
-        run.steps_until(run.cycles),
-        segment.drive_from,
-    )
+    """Progress of a run within a segment.
+
+    Parameters
+    ----------
+    run
+        Settings of the run.
+    cycles
+        Number of cycles of the current attempt.
+    segment
+        The segment; its end does not matter.
+    step
+        The step that the engine has reached.
+    seconds
+        Wall time since the start of the segment, s. In the first second the speed is not told.
+    """
     step = max(step, segment.begin)
-    done = before + (0 if start is None else step - start)
-    rate = (step - segment.begin) / seconds if seconds >= _STARTING_SECONDS else 0.0
-    share, simulated = done / steps, (before + step) * run.time_step
-    text = "coming to rest" if start is None else f"{100 * share:.0f} %"
-    if not rate:
+    steps_of_earlier_attempts = run.steps_until(cycles - 1)
+    steps = run.steps_until(run.cycles)
+    done = steps_of_earlier_attempts
+    if segment.drive_from is not None:
+        done += step - segment.drive_from
+    share = done / steps
+    text = "coming to rest" if segment.drive_from is None else f"{100 * share:.0f} %"
+    rate = 0.0
+    if seconds >= _STARTING_SECONDS:
+        rate = (step - segment.begin) / seconds
+    if rate == 0.0:
         stage = text if step > segment.begin else "starting"
         return Progress(share, stage, stage)
-    left = f"{'at most ' if run.until_steady or run.until else ''}{duration_text((steps - done) / rate)} left"
+    left = f"{duration_text((steps - done) / rate)} left"
+    if run.until_steady or run.until:
+        left = f"at most {left}"
+    simulated = (steps_of_earlier_attempts + step) * run.time_step
     details = f"{text}, {left}, {simulated:.3f} s simulated, {rate:.0f} steps/s"
     return Progress(share, details, text)
 
 
-def _are_constant(directory: Path) -> bool:
-    from walkers.postprocess.measure.gait import (
-        are_constant,
-    )  # numpy is loaded while the engine runs
+def _step_callback(
+    run: RunSettings, cycles: int, segment: Segment, tell: Tell | None
+) -> Callable[[int], None] | None:
+    """A callback for the steps that `launch` sees, which tells the progress of the run."""
+    if tell is None:
+        return None
+    start = time.perf_counter()
 
-    return are_constant(directory)
+    def tell_step(step: int) -> None:
+        seconds = time.perf_counter() - start
+        tell(progress_in(run, cycles, segment, step, seconds))
+
+    return tell_step
 
 
-# --- one run ----------------------------------------------------------------------------------------------------------
+# --- one run --------------------------------------------------------------------------------------
 
 
 @dataclass
 class OpenRun:
     """A run in progress, in a directory beside its final place (`open_locked`).
 
-    ``done`` are the records of the complete segments, ``ended`` is the reason why the run ended early, if it did.
+    Attributes
+    ----------
+    case
+        The case.
+    engine
+        The engine.
+    directory
+        Where the run is made.
+    place
+        Its final directory.
+    locks
+        File descriptors of its lock, which the engine inherits.
+    done
+        Records of the complete segments.
+    started
+        Start of the run, s since the epoch.
+    ended
+        Why the run ended early, if it did.
     """
 
     case: Case
@@ -223,74 +326,92 @@ class OpenRun:
         time_limit: float | None = None,
         render: Callable[[Case, Segment], Deck] = decks.render_deck,
     ) -> None:
-        """Make the missing segments with decks by ``render``; ``time_limit`` (s) applies to each.
+        """Make the missing segments. Complete segments are kept if the engine fails.
 
-        Complete segments are kept if the engine fails.
+        Parameters
+        ----------
+        on_progress
+            Is called a few times per second.
+        time_limit
+            Wall time of each segment, s.
+        render
+            Writes the deck of a segment.
         """
         for cycles in self.case.run.attempts:
             case = self.case.for_cycles(cycles)
-            if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
-                for directory in run_directory.segment_directories(
-                    self.directory
-                ):  # of an attempt with fewer cycles
-                    shutil.rmtree(directory)
-                self.done.clear()
-            while (segment := self._next_segment(case)).end > segment.begin:
-                tell = _teller(self.case.run, cycles, segment, on_progress)
+            self._remove_shorter_attempt(case)
+            segment = self._next_segment(case)
+            while segment.end > segment.begin:
+                tell = _step_callback(self.case.run, cycles, segment, on_progress)
                 try:
-                    self._make(segment, render(case, segment), tell, time_limit)
-                    if self.case.run.until == "climb" and self._has_climbed():
-                        self.ended = "a cluster has climbed (run.until)"
-                        return
+                    self._make_segment(segment, render(case, segment), tell, time_limit)
                 except BeadsOverTheTop as over:
-                    begun_at = run_directory.drive_from(self.case, self.done)
-                    if not case.boundary.closed or begun_at is None or segment.begin <= begun_at:
+                    if not self._ends_with_lost_beads(segment):
                         raise
-                    # A climber left the container: this ends the experiment; the segments before are valid.
-                    shutil.rmtree(
-                        self.directory / run_directory.SEGMENTS / f"{len(self.done):04d}.new"
-                    )
-                    self.ended = (
-                        f"{over.lost} bead(s) left the container over its walls in the next segment"
-                    )
+                    self._end_before(over)
                     return
+                if self.case.run.until == "climb" and self._has_climbed():
+                    self.ended = "a cluster has climbed (run.until)"
+                    return
+                segment = self._next_segment(case)
             if cycles < self.case.run.cycles and _are_constant(self.directory):
                 return
 
+    def _remove_shorter_attempt(self, case: Case) -> None:
+        """Remove the segment of an attempt with fewer cycles than a case has."""
+        if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
+            for directory in run_directory.segment_directories(self.directory):
+                shutil.rmtree(directory)
+            self.done.clear()
+
+    def _ends_with_lost_beads(self, segment: Segment) -> bool:
+        """Whether beads that leave the container in a segment end the experiment, and are no
+        failure.
+
+        The drive must have begun in an earlier segment: these segments are valid.
+        """
+        drive_from = run_directory.drive_from(self.case, self.done)
+        has_begun = drive_from is not None and segment.begin > drive_from
+        return self.case.boundary.closed and has_begun
+
+    def _end_before(self, over: BeadsOverTheTop) -> None:
+        """End the run before the segment in which beads left the container."""
+        new = self.directory / run_directory.SEGMENTS / f"{len(self.done):04d}.new"
+        shutil.rmtree(new)
+        self.ended = f"{over.lost} bead(s) left the container over its walls in the next segment"
+
     def _has_climbed(self) -> bool:
         """Whether a cluster has climbed in the complete segments."""
-        from walkers.postprocess.measure.motion import (
-            read_motion,
-        )  # numpy is loaded while the engine runs
+        # These modules load numpy, which takes no time while the engine runs.
+        from walkers.postprocess.measure.motion import read_motion
         from walkers.postprocess.measure.piles import has_climbed
 
-        if (
-            run_directory.drive_from(self.case, self.done[:-1]) is None
-        ):  # the beads came to rest in this segment
-            return False
+        if run_directory.drive_from(self.case, self.done[:-1]) is None:
+            return False  # the beads came to rest in the last segment
         return has_climbed(read_motion(self.directory))
 
     def _next_segment(self, case: Case) -> Segment:
-        return decks.next_segment(
-            case,
-            int(self.done[-1]["end"]) if self.done else 0,
-            run_directory.drive_from(self.case, self.done),
-        )
+        """The segment after the complete ones; empty after the last one."""
+        begin = int(self.done[-1]["end"]) if self.done else 0
+        return decks.next_segment(case, begin, run_directory.drive_from(self.case, self.done))
 
-    def _make(
+    def _make_segment(
         self,
         segment: Segment,
         deck: Deck,
         tell: Callable[[int], None] | None,
         time_limit: float | None,
     ) -> None:
-        folder, number = self.directory / run_directory.SEGMENTS, len(self.done)
-        new, before = folder / f"{number:04d}.new", folder / f"{number - 1:04d}"
+        """Run the deck of the next segment, and add the segment's record to `done`."""
+        folder = self.directory / run_directory.SEGMENTS
+        number = len(self.done)
+        new = folder / f"{number:04d}.new"
+        before = folder / f"{number - 1:04d}"
         shutil.rmtree(new, ignore_errors=True)
         if number and not run_directory.has_tables_of(before, deck):
             raise BridgeTablesDiffer(
-                f"{before / decks.BRIDGES_NAME} has other forces than this program computes: the run was begun "
-                "by another version, or on another kind of machine; "
+                f"{before / decks.BRIDGES_NAME} has other forces than this program computes: "
+                "the run was begun by another version, or on another kind of machine; "
                 f"delete {self.directory} and repeat the run, or continue it there"
             )
         with run_directory.write_errors_as_failures(new, deck.layout.bead_dump_bytes):
@@ -302,16 +423,10 @@ class OpenRun:
                 deck, new, self.engine, on_step=tell, time_limit=time_limit, keep_open=self.locks
             )
             (new / decks.PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
-            restart = new / decks.RESTART_NAME
-            size = restart.stat().st_size if restart.exists() else 0
-            if (
-                not self.case.run.has_one_segment and size < _LEAST_BYTES * deck.layout.atoms
-            ):  # the engine does not check this
-                raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
-            velocities = _RMS_VELOCITY.findall((new / decks.OUTPUT_NAME).read_bytes())
-            record = run_directory.write_segment_record(
-                new, segment, report, float(velocities[-1]) if velocities else None
-            )
+            if not self.case.run.has_one_segment:
+                _check_restart(new / decks.RESTART_NAME, deck.layout.atoms)
+            velocity = _rms_velocity(new / decks.OUTPUT_NAME)
+            record = run_directory.write_segment_record(new, segment, report, velocity)
             os.sync()  # so that the new name survives a loss of power; faster than file by file
             new.rename(folder / f"{number:04d}")
             fsync_path(folder)
@@ -322,49 +437,67 @@ class OpenRun:
 
     def finish(self) -> None:
         """Write the manifest, and move the directory to its place."""
-        wall_seconds, loop_seconds = (
-            sum(record[name] for record in self.done) for name in ("wall_seconds", "loop_seconds")
-        )
         report = EngineReport(
-            self.done[0]["version"], wall_seconds, loop_seconds, int(self.done[-1]["end"])
+            version=self.done[0]["version"],
+            wall_seconds=sum(record["wall_seconds"] for record in self.done),
+            loop_seconds=sum(record["loop_seconds"] for record in self.done),
+            steps=int(self.done[-1]["end"]),
         )
-        start = run_directory.drive_from(self.case, self.done) or 0
-        rest = [
-            segment["root_mean_square_velocity"] for segment in self.done if segment["end"] <= start
-        ]
-        finished = FinishedRun(
-            case=self.case,
-            name=self.place.name,
-            engine=self.engine,
-            report=report,
+        drive_from = run_directory.drive_from(self.case, self.done) or 0
+        settled = None
+        for record in self.done:
+            if record["end"] <= drive_from:
+                settled = record["root_mean_square_velocity"]
+        ended: dict[str, Any] = {}
+        if self.ended:
+            ended["ended"] = self.ended
+        write_manifest(
+            self.case,
+            self.place.name,
+            self.engine,
+            report,
             started=self.started,
+            directory=self.directory,
             segments=len(self.done),
-            drive_from=start,
-            settled=rest[-1] if rest else None,
-            ended=self.ended,
+            drive_from=drive_from,
+            settled=settled,
+            **ended,
         )
-        write_manifest(self.directory, finished)
         os.sync()
         run_directory.move_into_place(self.directory, self.place)
 
 
-def _teller(
-    run: RunSettings, cycles: int, segment: Segment, tell: Tell | None
-) -> Callable[[int], None] | None:
-    """A function that reports the progress of the run at a step of a segment."""
-    begin = time.perf_counter()
-    return tell and (
-        lambda step: tell(progress_in(run, cycles, segment, step, time.perf_counter() - begin))
-    )
+def _make_alone(case: Case, place: Path, options: _LaunchOptions, *, anew: bool) -> None:
+    """Make and measure a run whose place is locked; continue it unless it is made ``anew``."""
+    with open_locked(case, options.engine, place, options.locks, anew=anew) as run:
+        run.make(on_progress=options.on_progress, time_limit=options.time_limit)
+        if options.on_progress is not None:
+            options.on_progress(Progress(1.0, "measuring"))
+        measure(run.directory)
+        run.finish()
 
 
 @contextmanager
 def open_locked(
     case: Case, engine: Engine, place: Path, locks: Sequence[int], *, anew: bool = False
 ) -> Iterator[OpenRun]:
-    """Open a run whose place the caller has locked, to start it, or to continue it unless ``anew``.
+    """Open a run whose place the caller has locked, to start it, or to continue it.
 
-    Without `OpenRun.finish` the directory remains ``….incomplete``; after a failure it contains ``failure.json``.
+    Without `OpenRun.finish` the directory remains ``….incomplete``; after a failure it contains
+    ``failure.json``.
+
+    Parameters
+    ----------
+    case
+        The case.
+    engine
+        The engine.
+    place
+        The final directory of the run.
+    locks
+        File descriptors of the lock, which the engine inherits.
+    anew
+        Start the run again instead of continuing it.
     """
     directory = run_directory.unfinished(place)
     run_directory.recover(place)
@@ -373,12 +506,7 @@ def open_locked(
     try:
         with run_directory.write_errors_as_failures(directory):
             (directory / run_directory.SEGMENTS).mkdir(parents=True, exist_ok=True)
-            # Left by an earlier call, besides complete segments: tables, incomplete files and segments.
-            for path in (*directory.iterdir(), *(directory / run_directory.SEGMENTS).glob("*.new")):
-                if path.is_file():
-                    path.unlink()
-                elif path.name != run_directory.SEGMENTS:
-                    shutil.rmtree(path)
+            _remove_incomplete_files(directory)
             run_directory.write_case(directory, case)
             done = [_read_segment(path) for path in run_directory.segment_directories(directory)]
             yield OpenRun(case, engine, directory, place, locks, done)
@@ -395,71 +523,130 @@ def open_locked(
         raise
 
 
+def _remove_incomplete_files(directory: Path) -> None:
+    """Remove what an earlier call left besides complete segments."""
+    segments = directory / run_directory.SEGMENTS
+    for path in [*directory.iterdir(), *segments.glob("*.new")]:
+        if path.is_file():
+            path.unlink()
+        elif path != segments:
+            shutil.rmtree(path)
+
+
 def _read_segment(directory: Path) -> dict[str, Any]:
+    """The record of a complete segment; `DamagedSegment` if it cannot be read."""
     try:
         record = read_json(directory / run_directory.SEGMENT_NAME)
         if record["end"] > record["begin"] and "drive_from" in record:
             return record
         raise ValueError("begin, end or drive_from is missing or wrong")
     except (OSError, ValueError, KeyError, TypeError) as error:
-        message = (
-            f"{directory} is damaged ({error}): delete {directory.parent.parent} and repeat the run"
-        )
+        run = directory.parent.parent
+        message = f"{directory} is damaged ({error}): delete {run} and repeat the run"
         raise DamagedSegment(message) from error
 
 
-# --- several runs -----------------------------------------------------------------------------------------------------
+def _check_restart(restart: Path, atoms: int) -> None:
+    """Raise `DamagedSegment` unless a restart file is complete, which the engine does not check."""
+    size = restart.stat().st_size if restart.exists() else 0
+    if size < _LEAST_BYTES * atoms:
+        raise DamagedSegment(f"{restart} is incomplete ({size} bytes): is the disk full?")
+
+
+def _rms_velocity(log: Path) -> float | None:
+    """The root mean square velocity (m/s) that a deck printed last; None if it printed none."""
+    velocities = _RMS_VELOCITY.findall(log.read_bytes())
+    return float(velocities[-1]) if velocities else None
+
+
+def _are_constant(directory: Path) -> bool:
+    """Whether the velocities of the walkers of a run are constant."""
+    # This module loads numpy, which takes no time while the engine runs.
+    from walkers.postprocess.measure.gait import are_constant
+
+    return are_constant(directory)
+
+
+# --- several runs ---------------------------------------------------------------------------------
+
+
+def _make_in_shared_decks(
+    missing: Mapping[Path, Case], out: Path, options: _LaunchOptions
+) -> list[str]:
+    """Make and measure runs together, in one deck for each attempt; return their names.
+
+    After each attempt, the runs whose velocities are not constant yet are made again with more
+    cycles.
+    """
+    left = {place.name: case for place, case in missing.items()}
+    made: list[str] = []
+    if not left:
+        return made
+    attempts = next(iter(left.values())).run.attempts
+    for cycles in attempts:
+        if left:
+            made += _make_together(left, cycles, out, options)
+            left = {name: case for name, case in left.items() if name not in made}
+    return made
 
 
 def _make_together(
-    cases: Mapping[str, Case],
-    cycles: int,
-    out: Path,
-    engine: Engine,
-    locks: Sequence[int],
-    on_progress: Tell | None,
-    time_limit: float | None,
+    cases: Mapping[str, Case], cycles: int, out: Path, options: _LaunchOptions
 ) -> list[str]:
-    """Make runs in one deck for a number of cycles; return those with constant velocities or all of their cycles."""
-    tried = {name: case.for_cycles(cycles) for name, case in cases.items()}
-    deck, started = decks.compose(decks.plan_of(*tried.values())), time.time()
+    """Make runs in one deck for a number of cycles.
+
+    Returns
+    -------
+    list of str
+        Names of the runs that are finished: their velocities are constant, or they have all of
+        their cycles.
+    """
+    attempted = {name: case.for_cycles(cycles) for name, case in cases.items()}
+    deck = decks.compose(decks.plan_of(*attempted.values()))
+    started = time.time()
     first = next(iter(cases))
     incomplete = run_directory.unfinished(out / first)
+    folder = incomplete / DECK_FOLDER
     shutil.rmtree(incomplete, ignore_errors=True)
     try:
         with run_directory.write_errors_as_failures(incomplete, deck.layout.bead_dump_bytes):
-            check_free_space(
-                out, 2 * deck.layout.bead_dump_bytes
-            )  # the dump and its parts exist at the same time
-            (incomplete / DECK_FOLDER).mkdir(parents=True)
-            run_directory.write_deck(deck, incomplete / DECK_FOLDER)
+            # The dump and its parts exist at the same time.
+            check_free_space(out, 2 * deck.layout.bead_dump_bytes)
+            folder.mkdir(parents=True)
+            run_directory.write_deck(deck, folder)
             # For other processes the directory is the unfinished first run.
-            for name, case in [(".", cases[first]), *cases.items()]:
-                (incomplete / name).mkdir(exist_ok=True)
+            run_directory.write_case(incomplete, cases[first])
+            for name, case in cases.items():
+                (incomplete / name).mkdir()
                 run_directory.write_case(incomplete / name, case)
-            tell = _teller(cases[first].run, cycles, decks.next_segment(tried[first]), on_progress)
-            folder = incomplete / DECK_FOLDER
+            segment = decks.next_segment(attempted[first])
+            tell = _step_callback(cases[first].run, cycles, segment, options.on_progress)
             report = launch(
-                deck, folder, engine, on_step=tell, time_limit=time_limit, keep_open=locks
+                deck,
+                folder,
+                options.engine,
+                on_step=tell,
+                time_limit=options.time_limit,
+                keep_open=options.locks,
             )
-            _part(incomplete, tried, deck, report)
-            done = [
-                name
-                for name in cases
-                if cycles >= cases[name].run.cycles or _are_constant(incomplete / name)
-            ]
-            shared = {"first": first, "runs": len(done), "walkers": len(deck.layout.walkers)}
+            _distribute_output(incomplete, attempted, deck, report)
+            done = []
+            for name, case in cases.items():
+                if cycles >= case.run.cycles or _are_constant(incomplete / name):
+                    done.append(name)
+            shared_deck = {"first": first, "runs": len(done), "walkers": len(deck.layout.walkers)}
             for name in done:
                 measure(incomplete / name)
-                finished = FinishedRun(
-                    case=cases[name],
-                    name=name,
-                    engine=engine,
-                    report=report,
+                write_manifest(
+                    cases[name],
+                    name,
+                    options.engine,
+                    report,
                     started=started,
-                    segments=1,
+                    directory=incomplete / name,
                     drive_from=0,
-                    shared_deck=shared,
+                    segments=1,
+                    shared_deck=shared_deck,
                 )
                 write_manifest(incomplete / name, finished)
             os.sync()
@@ -472,16 +659,17 @@ def _make_together(
     return done
 
 
-def _part(incomplete: Path, cases: Mapping[str, Case], deck: Deck, report: EngineReport) -> None:
-    """Give each run its part of the output, and the deck."""
+def _distribute_output(
+    incomplete: Path, cases: Mapping[str, Case], deck: Deck, report: EngineReport
+) -> None:
+    """Give each run its part of the output, and a copy of the shared deck."""
     from walkers.runs.splitting import split_output
 
-    places = {incomplete / name / run_directory.FIRST_SEGMENT: case for name, case in cases.items()}
-    for place in places:
-        place.mkdir(parents=True)
-    split_output(incomplete / DECK_FOLDER, deck.layout, places)
-    for name, (place, case) in zip(cases, places.items(), strict=True):
-        run_directory.write_segment_record(place, decks.next_segment(case), report)
-        shutil.copytree(
-            incomplete / DECK_FOLDER, incomplete / name / DECK_FOLDER, copy_function=link_or_copy
-        )
+    segments = {name: incomplete / name / run_directory.FIRST_SEGMENT for name in cases}
+    for segment in segments.values():
+        segment.mkdir(parents=True)
+    shared = incomplete / DECK_FOLDER
+    split_output(shared, deck.layout, {segments[name]: case for name, case in cases.items()})
+    for name, case in cases.items():
+        run_directory.write_segment_record(segments[name], decks.next_segment(case), report)
+        shutil.copytree(shared, incomplete / name / DECK_FOLDER, copy_function=link_or_copy)
