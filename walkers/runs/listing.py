@@ -1,7 +1,7 @@
 """The runs in a folder with their status, and as text.
 
-Listing opens no dumps and no tables, and does without pandas: a folder of ten thousand runs takes seconds. Sweeps are
-listed by `walkers.sweeps.listing`.
+Listing opens no dumps and no tables, and does without pandas: a folder of ten thousand runs takes
+seconds. Sweeps are listed by `walkers.sweeps.listing`.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """What a user means by a name: a run, a sweep, a calibration, an archive, a deck or a case.
 
-A name is looked up once, by `find`. The `Reference` that it gives knows its case and its run, and is handed on.
+A name is looked up once, by `find`. The `Reference` that it gives knows its case and its run, and
+is handed on.
 """
 
 from __future__ import annotations
@@ -54,8 +55,8 @@ class Reference:
     kind
         What it is, without the changes: changed, a run is another case.
     path
-        Where it is: the final directory of a run that is not finished, the name of a shipped case, the folder ``out``
-        of a case that is given by itself.
+        Where it is: the final directory of a run that is not finished, the name of a shipped case,
+        the folder ``out`` of a case that is given by itself.
     out
         Folder of the run directories.
     changes
@@ -122,14 +123,15 @@ def find(
 ) -> Reference:
     """Find what a user means by a name. No case is read, and no run.
 
-    A folder does not hide a shipped case of the same name. The file of a sweep means the sweep if it was run.
+    A folder does not hide a shipped case of the same name. The file of a sweep means the sweep if
+    it was run.
 
     Parameters
     ----------
     given
-        The directory of a run or a sweep, its name in the folder ``out``, an archive, a deck that was run by hand, or a
-        case (resolved, tables, file or shipped name). A reference is returned as it is, whatever ``out`` and
-        ``changes`` are.
+        The directory of a run or a sweep, its name in the folder ``out``, an archive, a deck that
+        was run by hand, or a case (resolved, tables, file or shipped name). A reference is
+        returned as it is, whatever ``out`` and ``changes`` are.
     out
         Folder of the run directories.
     changes

@@ -1,8 +1,8 @@
 """Removal of runs, and of what killed processes left in a folder of runs.
 
-Runs in progress are never removed: removal holds the lock of the run. The manifest of a finished run is
-removed first and its case last: after an interruption the rest is an interrupted run, and the next
-removal takes it.
+Runs in progress are never removed: removal holds the lock of the run. The manifest of a finished
+run is removed first and its case last: after an interruption the rest is an interrupted run, and
+the next removal takes it.
 """
 
 from __future__ import annotations

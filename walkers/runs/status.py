@@ -12,15 +12,27 @@ from walkers.runner.run_directory import FAILURE_NAME, is_finished, is_locked, u
 from walkers.runs.making import share_kept
 
 _STATUSES = ("finished", "running", "failed", "missing")
+"""Statuses of points, in the order in which texts name them."""
 
 
 @dataclass(frozen=True)
 class PointState:
-    """State of a point: finished, failed, running or missing.
+    """State of a point of a sweep, or of another run.
 
-    ``directory`` is the directory of the finished or failed run, ``result`` its result if it was read. ``reason``,
-    ``message`` and ``lost`` describe a failure. The ``message`` of a missing point whose run was interrupted says how
-    much of it is done.
+    Attributes
+    ----------
+    status
+        ``finished``, ``failed``, ``running`` or ``missing``.
+    directory
+        The directory of the finished or failed run.
+    reason
+        Name of the failure.
+    message
+        Description of the failure; for a missing run that was interrupted, how much of it is done.
+    lost
+        Number of beads that were lost in a failure.
+    result
+        Result of the finished run, if it was read.
     """
 
     status: str
@@ -32,32 +44,53 @@ class PointState:
 
 
 def worst_status(points: Iterable[str]) -> str:
-    """Status of a sweep from its points: running, interrupted or failed if one is, in this order, or finished."""
+    """Status of a sweep from the statuses of its points.
+
+    ``running`` if a point is, else ``interrupted`` if a point is missing, else ``failed`` if a
+    point has failed, else ``finished``.
+    """
     statuses = set(points)
-    worst = {"running": "running", "missing": "interrupted", "failed": "failed"}
-    return next(
-        (status for status_of_point, status in worst.items() if status_of_point in statuses),
-        "finished",
-    )
+    if "running" in statuses:
+        return "running"
+    if "missing" in statuses:
+        return "interrupted"
+    if "failed" in statuses:
+        return "failed"
+    return "finished"
 
 
 def state_at(place: Path, directory: Path | None = None) -> PointState:
-    """State of the run that belongs in a place, or with a ``directory`` of the unfinished run in it."""
+    """State of the run that belongs in a place.
+
+    Parameters
+    ----------
+    place
+        The final directory of the run.
+    directory
+        The directory of its unfinished run, if the state of this run is asked for even where
+        another one is finished.
+    """
     if directory is None and is_finished(place):
         return PointState("finished", place)
     if is_locked(place):
         return PointState("running")
-    directory = directory or unfinished(place)
+    run = directory or unfinished(place)
     try:
-        failure = read_json(directory / FAILURE_NAME)
-        reason, message = str(failure["reason"]), str(failure["message"])
-        return PointState("failed", directory, reason, message, int(failure.get("lost", 0)))
+        failure = read_json(run / FAILURE_NAME)
+        return PointState(
+            "failed",
+            directory=run,
+            reason=str(failure["reason"]),
+            message=str(failure["message"]),
+            lost=int(failure.get("lost", 0)),
+        )
     except (OSError, ValueError, KeyError, TypeError):
         share = share_kept(place)
-        done = None if share is None else f"{100 * share:.0f} % done"
-        return PointState("missing", message=done)
+        message = None if share is None else f"{100 * share:.0f} % done"
+        return PointState("missing", message=message)
 
 
 def status_text(numbers: Mapping[str, int]) -> str:
-    """Numbers of points by status as text: ``8 finished, 2 failed``."""
-    return ", ".join(f"{numbers[status]} {status}" for status in _STATUSES if numbers.get(status))
+    """Numbers of points by status as text, such as ``8 finished, 2 failed``."""
+    present = [status for status in _STATUSES if numbers.get(status)]
+    return ", ".join(f"{numbers[status]} {status}" for status in present)
