@@ -8,7 +8,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from walkers import DEFAULT_OUT
-from walkers.commands.options import Json, Out, print_as, tell
+from walkers.commands.options import JsonOption, OutOption, print_as, tell
 from walkers.main import main, new_app
 
 app = new_app("python -m studies.literature")
@@ -16,7 +16,9 @@ app = new_app("python -m studies.literature")
 
 @app.default
 def literature(
-    *only: Annotated[str, Parameter(name="CHECK")], out: Out = DEFAULT_OUT, as_json: Json = False
+    *only: Annotated[str, Parameter(name="CHECK")],
+    out: OutOption = DEFAULT_OUT,
+    as_json: JsonOption = False,
 ) -> int:
     """Compare engine and bridge laws with published benchmarks, exact solutions and a second engine.
 

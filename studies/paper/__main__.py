@@ -6,7 +6,14 @@ from pathlib import Path
 
 from studies.paper.make import FORMATS, make_figures
 from walkers import DEFAULT_OUT
-from walkers.commands.options import Engine, Formats, Jobs, Out, print_lines, tell
+from walkers.commands.options import (
+    EngineOption,
+    FormatsOption,
+    JobsOption,
+    OutOption,
+    print_lines,
+    tell,
+)
 from walkers.main import main, new_app
 from walkers.sweeps.scheduler import SweepOptions
 
@@ -16,12 +23,12 @@ app = new_app("python -m studies.paper")
 @app.default
 def paper(
     *,
-    out: Out = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
     to: Path = Path("figures"),
     only: list[str] | None = None,
-    formats: Formats = None,
-    jobs: Jobs = None,
-    engine: Engine = None,
+    formats: FormatsOption = None,
+    jobs: JobsOption = None,
+    engine: EngineOption = None,
 ) -> int:
     """Draw the paper's figures with our results, and write a table of its facts. Missing runs are made first.
 

@@ -12,13 +12,13 @@ from cyclopts.validators import Number
 import walkers
 from walkers import DEFAULT_OUT
 from walkers.commands.options import (
-    At,
-    Case,
-    Engine,
-    Jobs,
-    Json,
-    Out,
-    RunOrSweep,
+    CaseArgument,
+    EngineOption,
+    JobsOption,
+    JsonOption,
+    LookupOptions,
+    OutOption,
+    RunOrSweepArgument,
     print_as,
     print_lines,
     refuse,
@@ -34,7 +34,9 @@ check = App(name="check", version_flags=(), group_parameters="Options")
 
 
 @check.command
-def engine(*, only: list[str] | None = None, as_json: Json = False, engine: Engine = None) -> int:
+def engine(
+    *, only: list[str] | None = None, as_json: JsonOption = False, engine: EngineOption = None
+) -> int:
     """Compare the forces of the engine and its contact model with a second engine and exact formulas.
 
     Parameters
@@ -65,27 +67,27 @@ def _print_checked(lines: Sequence[Line], as_json: bool, of: str = "", **more: A
 
 
 @check.command
-def files(name: RunOrSweep, /, *, at: At = At()) -> int:
+def files(name: RunOrSweepArgument, /, *, lookup: LookupOptions = LookupOptions()) -> int:
     """Compare the files of a run, a sweep or an archive (a .zip file or its folder) with their checksums."""
     from walkers.api import directory_of
     from walkers.archive.verification import verify
 
-    parts = verify(directory_of(name, at.out, at.values))
+    parts = verify(directory_of(name, lookup.out, lookup.values))
     print_lines(part.describe() for part in parts)
     return 0 if all(part.passed for part in parts) else 1
 
 
 @check.default
 def case(
-    case: Case,
+    case: CaseArgument,
     /,
     *,
-    at: At = At(),
+    lookup: LookupOptions = LookupOptions(),
     cycles: int | None = None,
     without: Annotated[list[str] | None, Parameter(metavar="TERM")] = None,
     seeds: Annotated[int, Parameter(validator=Number(gte=1))] = 1,
-    as_json: Json = False,
-    engine: Engine = None,
+    as_json: JsonOption = False,
+    engine: EngineOption = None,
 ) -> int:
     """Run CASE with LIGGGHTS and with an independent second engine in Python, and compare the motion.
 
@@ -102,7 +104,7 @@ def case(
     from walkers.second_engine.crosscheck import crosscheck, with_cycles
     from walkers.second_engine.engine import TERMS
 
-    loaded = find(case, at.out, at.values).case
+    loaded = find(case, lookup.out, lookup.values).case
     refuse(
         "--seeds",
         seeds > 1 and loaded.mixture is None,
@@ -114,7 +116,7 @@ def case(
         loaded = loaded if cycles is None else with_cycles(loaded, cycles)
     except ValueError as error:
         raise input_error("--cycles", str(error)) from error
-    lines = crosscheck(loaded, at.out, without or (), seeds=seeds, progress=True, engine=engine)
+    lines = crosscheck(loaded, lookup.out, without or (), seeds=seeds, progress=True, engine=engine)
     return _print_checked(lines, as_json, case=loaded.name, without=without or [])
 
 
@@ -136,9 +138,9 @@ def calibrate(
     calibration: Annotated[str, Parameter(name="CALIBRATION")],
     /,
     *,
-    out: Out = DEFAULT_OUT,
-    jobs: Jobs = None,
-    engine: Engine = None,
+    out: OutOption = DEFAULT_OUT,
+    jobs: JobsOption = None,
+    engine: EngineOption = None,
 ) -> int:
     """Calibrate unknown parameters to measured or published values. An interrupted calibration continues.
 

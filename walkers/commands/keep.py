@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 from walkers import DEFAULT_OUT
 from walkers.api import Export, directory_of, writer_of
-from walkers.commands.options import At, Out, RunOrSweep, refuse, tell
+from walkers.commands.options import LookupOptions, OutOption, RunOrSweepArgument, refuse, tell
 from walkers.errors import apply_all
 from walkers.runner.run_directory import UNFINISHED
 from walkers.runs.by_hand import as_run, write_folder
@@ -51,12 +51,12 @@ class ExportOptions:
 
 
 def export(
-    name: RunOrSweep,
+    name: RunOrSweepArgument,
     /,
     *,
     form: Annotated[Export, Parameter("--to")],
     to: Annotated[Path | None, Parameter("-o", metavar="PATH")] = None,
-    at: At = At(),
+    lookup: LookupOptions = LookupOptions(),
     options: ExportOptions = ExportOptions(),
 ) -> None:
     """Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, or an archive to publish.
@@ -74,10 +74,10 @@ def export(
     if "dumps" in given:
         given["dumps"] = False
     if form != "deck":
-        print(at.load(name).export(form, to, **given))
+        print(lookup.load(name).export(form, to, **given))
         return
     writer_of(form, given)
-    named = find(name, at.out, at.values)
+    named = find(name, lookup.out, lookup.values)
     case = as_run(named.case, named.finished_run)
     if to is None:
         print(render_deck(case, single_segment(case)).text, end="")
@@ -90,8 +90,8 @@ def export(
 
 
 def clean(
-    *runs: Annotated[RunOrSweep, Parameter(help=_REMOVED)],
-    out: Out = DEFAULT_OUT,
+    *runs: Annotated[RunOrSweepArgument, Parameter(help=_REMOVED)],
+    out: OutOption = DEFAULT_OUT,
     yes: Annotated[bool, Parameter(("--yes", "-y"))] = False,
 ) -> int:
     """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay.

@@ -10,12 +10,12 @@ from cyclopts import Parameter
 import walkers
 from walkers import DEFAULT_OUT
 from walkers.commands.options import (
-    At,
-    Formats,
-    Json,
-    Out,
-    Run,
-    RunOrSweep,
+    FormatsOption,
+    JsonOption,
+    LookupOptions,
+    OutOption,
+    RunArgument,
+    RunOrSweepArgument,
     print_as,
     print_lines,
     refuse,
@@ -29,11 +29,11 @@ def list_(
     sweep: Annotated[str | None, Parameter(name="SWEEP")] = None,
     /,
     *,
-    out: Out = DEFAULT_OUT,
+    out: OutOption = DEFAULT_OUT,
     every: Annotated[bool, Parameter("--all")] = False,
     where: Annotated[list[str] | None, Parameter(metavar="KEY=VALUE")] = None,
     to: Path | None = None,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """List runs and sweeps with status, result, age and size, or print the table of one sweep.
 
@@ -90,13 +90,13 @@ def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
 
 
 def plot(
-    name: RunOrSweep,
+    name: RunOrSweepArgument,
     /,
     *,
-    at: At = At(),
+    lookup: LookupOptions = LookupOptions(),
     to: Path | None = None,
     options: FigureOptions = FigureOptions(),
-    formats: Formats = None,
+    formats: FormatsOption = None,
 ) -> None:
     """Plot a run (path, orientation and gait of walkers; climbs of piles) or a column of a sweep's table.
 
@@ -105,7 +105,7 @@ def plot(
     to
         Runs: folder of the figures. Sweeps: file to write (.png, .pdf, .svg).
     """
-    loaded = at.load(name)
+    loaded = lookup.load(name)
     if isinstance(loaded, walkers.Run):
         refuse_any(vars(options), "is for sweeps")
         print_lines(loaded.plot(to, formats or ["png"]))
@@ -115,10 +115,10 @@ def plot(
 
 
 def render(
-    run: Run,
+    run: RunArgument,
     /,
     *,
-    at: At = At(),
+    lookup: LookupOptions = LookupOptions(),
     to: Path | None = None,
     images: int | None = None,
     film: bool = False,
@@ -137,18 +137,20 @@ def render(
     """
     if film:
         refuse("--images", images is not None, "is for pictures, not for --film")
-        print(at.run(run).film(to, progress=True, **vars(options)))
+        print(lookup.run(run).film(to, progress=True, **vars(options)))
         return
     usual = vars(FilmOptions(walker=options.walker))
     refuse_any(
         {name: value != usual[name] for name, value in vars(options).items()}, "is for --film"
     )
     print_lines(
-        at.run(run).render(to, images=6 if images is None else images, walker=options.walker)
+        lookup.run(run).render(to, images=6 if images is None else images, walker=options.walker)
     )
 
 
-def report(name: RunOrSweep, /, *, at: At = At(), to: Path | None = None) -> None:
+def report(
+    name: RunOrSweepArgument, /, *, lookup: LookupOptions = LookupOptions(), to: Path | None = None
+) -> None:
     """Write a self-contained HTML report: parameters, results, plots and a 3-D view of the motion.
 
     Parameters
@@ -156,16 +158,16 @@ def report(name: RunOrSweep, /, *, at: At = At(), to: Path | None = None) -> Non
     to
         HTML file to write; default: report.html in the folder of the run or sweep.
     """
-    print(at.load(name).report(to))
+    print(lookup.load(name).report(to))
 
 
 def compare(
-    first: Run,
+    first: RunArgument,
     second: Annotated[str | None, Parameter(name="RUN")] = None,
     /,
     *,
-    at: At = At(),
-    as_json: Json = False,
+    lookup: LookupOptions = LookupOptions(),
+    as_json: JsonOption = False,
 ) -> None:
     """Compare two runs or cases in parameters and results; --set changes the second case.
 
@@ -174,16 +176,16 @@ def compare(
     second
         Another run or case, named in the same way; default: the first with the values of --set.
     """
-    comparison = walkers.compare(first, second, at.out, at.values)
+    comparison = walkers.compare(first, second, lookup.out, lookup.values)
     print_as(as_json, lambda: comparison.contents, lambda: comparison.text)
 
 
 def climb(
-    *names: Annotated[RunOrSweep, Parameter(help="Sweeps, runs or cases of piles.")],
-    at: At = At(),
+    *names: Annotated[RunOrSweepArgument, Parameter(help="Sweeps, runs or cases of piles.")],
+    lookup: LookupOptions = LookupOptions(),
     within: Seconds | None = None,
     to: Path | None = None,
-    as_json: Json = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Print probability, rate and speed of climbs in piles for each condition, with confidence intervals.
 
@@ -197,5 +199,5 @@ def climb(
     from walkers.sweeps.climbing import describe_climbs
 
     refuse("RUN|SWEEP", not names, "expected sweeps, runs or cases of piles")
-    climbs = walkers.climb(names, at.out, at.values, within=within, to=to)
+    climbs = walkers.climb(names, lookup.out, lookup.values, within=within, to=to)
     print_as(as_json, lambda: climbs, lambda: describe_climbs(climbs))

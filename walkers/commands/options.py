@@ -20,8 +20,7 @@ from walkers.errors import input_error
 if TYPE_CHECKING:
     from cyclopts.completion import CompletionContext
 
-    from walkers.api import Run as FoundRun
-    from walkers.api import Sweep
+    from walkers.api import Run, Sweep
 
 
 def _names(context: CompletionContext) -> list[str]:
@@ -39,14 +38,14 @@ AT_LEAST_1 = Number(gte=1)
 NOT_NEGATIVE = Number(gte=0)
 _CASE = "A case file, the name of a shipped case such as fig1b, or a run (name or folder)."
 _RUN = "its folder, its name in --out, or its case (file or name)."
-Case = Annotated[str, Parameter(name="CASE", completer=_names, help=_CASE)]
-Run = Annotated[str, Parameter(name="RUN", completer=_names, help=f"A run: {_RUN}")]
-RunOrSweep = Annotated[
+CaseArgument = Annotated[str, Parameter(name="CASE", completer=_names, help=_CASE)]
+RunArgument = Annotated[str, Parameter(name="RUN", completer=_names, help=f"A run: {_RUN}")]
+RunOrSweepArgument = Annotated[
     str, Parameter(name="RUN|SWEEP", completer=_names, help=f"A run or a sweep: {_RUN}")
 ]
 Folder = Annotated[Path, Parameter(validator=OfPath(file_okay=False))]
-Out = Annotated[Folder, Parameter(help="Folder that contains the runs.")]
-Jobs = Annotated[
+OutOption = Annotated[Folder, Parameter(help="Folder that contains the runs.")]
+JobsOption = Annotated[
     int | None,
     Parameter(
         ("--jobs", "-j"),
@@ -54,8 +53,8 @@ Jobs = Annotated[
         help="Number of parallel decks; default: one per core.",
     ),
 ]
-Json = Annotated[bool, Parameter("--json", help="Print JSON in SI units.")]
-Formats = Annotated[
+JsonOption = Annotated[bool, Parameter("--json", help="Print JSON in SI units.")]
+FormatsOption = Annotated[
     list[str] | None,
     Parameter("--format", help="Format of the figures: png, svg or pdf. Repeatable."),
 ]
@@ -63,7 +62,7 @@ Formats = Annotated[
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class At:
+class LookupOptions:
     """The folder of runs, and new values of the case.
 
     Parameters
@@ -73,7 +72,7 @@ class At:
     """
 
     changes: Annotated[list[str] | None, Parameter("--set", metavar="KEY=VALUE")] = None
-    out: Out = DEFAULT_OUT
+    out: OutOption = DEFAULT_OUT
 
     @property
     def values(self) -> dict[str, Any]:
@@ -82,13 +81,13 @@ class At:
 
         return settings_of(self.changes or ())
 
-    def load(self, name: str) -> FoundRun | Sweep:
+    def load(self, name: str) -> Run | Sweep:
         """The named sweep or run."""
         from walkers.api import load
 
         return load(name, self.out, self.values)
 
-    def run(self, name: str) -> FoundRun:
+    def run(self, name: str) -> Run:
         """The named run."""
         from walkers.api import Run
         from walkers.runs.names import not_a_run
@@ -105,7 +104,7 @@ def _check_engine(_: object, name: str | None) -> None:
         raise input_error(f"--engine {name}", "expected the name or path of a liggghts binary")
 
 
-Engine = Annotated[
+EngineOption = Annotated[
     str | None, Parameter(validator=_check_engine, help="Name or path of the liggghts binary.")
 ]
 

@@ -11,11 +11,11 @@ from cyclopts import Parameter
 import walkers
 from walkers.commands.options import (
     NOT_NEGATIVE,
-    At,
-    Case,
-    Engine,
-    Jobs,
-    Json,
+    CaseArgument,
+    EngineOption,
+    JobsOption,
+    JsonOption,
+    LookupOptions,
     print_as,
     print_lines,
     refuse,
@@ -52,7 +52,14 @@ def new(
     print_lines(walkers.new(name, case, schema=schema))
 
 
-def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = False) -> None:
+def show(
+    case: CaseArgument,
+    /,
+    *,
+    lookup: LookupOptions = LookupOptions(),
+    theory: bool = False,
+    as_json: JsonOption = False,
+) -> None:
     """Show all values of a case with their sources, the forces, the time step and the predicted run time.
 
     Parameters
@@ -63,7 +70,7 @@ def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = 
     if theory:
         from walkers.theory.prediction_text import prediction_text
 
-        predicted = walkers.predict(case, at.out, at.values)
+        predicted = walkers.predict(case, lookup.out, lookup.values)
         print_as(
             as_json, lambda: predicted, lambda: prediction_text(predicted, predicted["engine"])
         )
@@ -71,7 +78,7 @@ def show(case: Case, /, *, at: At = At(), theory: bool = False, as_json: Json = 
     from walkers.runs.names import find
     from walkers.runs.preview import preview_text, summarise
 
-    summary = summarise(find(case, at.out, at.values).case)
+    summary = summarise(find(case, lookup.out, lookup.values).case)
     print_as(as_json, lambda: summary, lambda: preview_text(summary))
 
 
@@ -84,15 +91,15 @@ def _draws(spread: bool, points: int | None) -> int:
 
 
 def run(
-    *cases: Case,
-    at: At = At(),
+    *cases: CaseArgument,
+    lookup: LookupOptions = LookupOptions(),
     force: bool = False,
-    as_json: Json = False,
+    as_json: JsonOption = False,
     limit: Annotated[float | None, Parameter(validator=NOT_NEGATIVE)] = None,
     spread: bool = False,
     points: int | None = None,
     accuracy: bool = False,
-    engine: Engine = None,
+    engine: EngineOption = None,
 ) -> int:
     """Run cases and print the results. A finished run is only printed, an interrupted run continues.
 
@@ -119,7 +126,7 @@ def run(
     refuse("CASE", not cases, "expected a case, such as fig1b")
     draws = _draws(spread, points)
     # Report a mistake in the last file before the first run starts.
-    named = [find(case, at.out, at.values) for case in cases]
+    named = [find(case, lookup.out, lookup.values) for case in cases]
     finished = [None for _ in named] if force else apply_all(finished_at, named)
     loaded = apply_all(case_to_run, zip(named, finished, strict=True))
     if accuracy:
@@ -164,14 +171,14 @@ def sweep(
     sweep: Annotated[str, Parameter(name="SWEEP")],
     /,
     *,
-    at: At = At(),
-    jobs: Jobs = None,
+    lookup: LookupOptions = LookupOptions(),
+    jobs: JobsOption = None,
     site: Path | None = None,
     dry_run: bool = False,
     limit: Annotated[float | None, Parameter(validator=NOT_NEGATIVE)] = None,
     spread: bool = False,
     points: int | None = None,
-    engine: Engine = None,
+    engine: EngineOption = None,
 ) -> int:
     """Run the missing points of a sweep on all cores or on a cluster. Exit status 1 if a point fails.
 
@@ -197,7 +204,7 @@ def sweep(
     from walkers.sweeps.spread import spread_sweep
 
     draws = _draws(spread, points)
-    loaded = load_sweep(sweep, at.values)
+    loaded = load_sweep(sweep, lookup.values)
     refuse(
         "--jobs",
         jobs is not None and site is not None,
@@ -209,11 +216,11 @@ def sweep(
     if dry_run:
         options = SweepOptions(jobs, load_site(site) if site else None)
         with progress_of(loaded.name) as advance:
-            plan = plan_sweep(loaded, at.out, options, engine, advance)
+            plan = plan_sweep(loaded, lookup.out, options, engine, advance)
         print(plan.as_text())
         if spread:
             sweeps = (spread_sweep(case, draws, engine) for case in loaded.cases())
-            plans = [plan_sweep(drawn, at.out, options, engine) for drawn in sweeps]
+            plans = [plan_sweep(drawn, lookup.out, options, engine) for drawn in sweeps]
             seconds, more = (
                 sum(plan.core_seconds for plan in plans),
                 sum(len(plan.missing) for plan in plans),
@@ -222,9 +229,9 @@ def sweep(
         return 0
     done = walkers.sweep(
         sweep,
-        at.out,
+        lookup.out,
         jobs=jobs,
-        changes=at.values,
+        changes=lookup.values,
         progress=True,
         site=site,
         time_limit=limit,
