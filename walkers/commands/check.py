@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import App, Parameter
 from cyclopts.validators import Number
@@ -27,9 +26,9 @@ from walkers.commands.options import (
 from walkers.errors import input_error
 
 if TYPE_CHECKING:
-    from walkers.second_engine.lines import Line
+    pass
 
-# It does not inherit the heading of its options.
+# An app of its own does not inherit the heading of the options.
 check = App(name="check", version_flags=(), group_parameters="Options")
 
 
@@ -37,7 +36,8 @@ check = App(name="check", version_flags=(), group_parameters="Options")
 def engine(
     *, only: list[str] | None = None, as_json: JsonOption = False, engine: EngineOption = None
 ) -> int:
-    """Compare the forces of the engine and its contact model with a second engine and exact formulas.
+    """Compare the forces of the engine and its contact model with a second engine and exact
+    formulas.
 
     Parameters
     ----------
@@ -46,6 +46,7 @@ def engine(
     """
     from walkers.runner.binary import find_engine
     from walkers.second_engine.audit import record, run_audit
+    from walkers.second_engine.lines import as_dict, failures, lines_text
 
     binary = find_engine(engine)
     lines, version = run_audit(only or (), engine=binary, on_done=tell)
@@ -55,20 +56,16 @@ def engine(
         except OSError as error:
             warnings.warn(f"the outcome cannot be kept: {error}", stacklevel=1)
     about = {"path": str(binary.path), "sha256": binary.sha256, "version": version}
-    name = f"{version}, binary and contact model {binary.sha256[:12]}: "
-    return _print_checked(lines, as_json, name, engine=about)
-
-
-def _print_checked(lines: Sequence[Line], as_json: bool, of: str = "", **more: Any) -> int:
-    from walkers.second_engine.lines import as_dict, failures, lines_text
-
-    print_as(as_json, lambda: as_dict(lines, **more), lambda: lines_text(lines, of))
+    heading = f"{version}, binary and contact model {binary.sha256[:12]}: "
+    print_as(as_json, lambda: as_dict(lines, engine=about), lambda: lines_text(lines, heading))
     return 1 if failures(lines) else 0
 
 
 @check.command
 def files(name: RunOrSweepArgument, /, *, lookup: LookupOptions = LookupOptions()) -> int:
-    """Compare the files of a run, a sweep or an archive (a .zip file or its folder) with their checksums."""
+    """Compare the files of a run, a sweep or an archive (a .zip file or its folder) with their
+    checksums.
+    """
     from walkers.api import directory_of
     from walkers.archive.verification import verify
 
@@ -89,7 +86,8 @@ def case(
     as_json: JsonOption = False,
     engine: EngineOption = None,
 ) -> int:
-    """Run CASE with LIGGGHTS and with an independent second engine in Python, and compare the motion.
+    """Run CASE with LIGGGHTS and with an independent second engine in Python, and compare the
+    motion.
 
     Parameters
     ----------
@@ -103,35 +101,45 @@ def case(
     from walkers.runs.names import find
     from walkers.second_engine.crosscheck import crosscheck, with_cycles
     from walkers.second_engine.engine import TERMS
+    from walkers.second_engine.lines import as_dict, failures, lines_text
 
     loaded = find(case, lookup.out, lookup.values).case
+    terms = without or []
     refuse(
         "--seeds",
         seeds > 1 and loaded.mixture is None,
         "is for piles: walkers and placed beads have one start",
     )
-    for term in without or ():
+    for term in terms:
         refuse(f"--without {term}", term not in TERMS, f"expected one of {', '.join(TERMS)}")
-    try:
-        loaded = loaded if cycles is None else with_cycles(loaded, cycles)
-    except ValueError as error:
-        raise input_error("--cycles", str(error)) from error
-    lines = crosscheck(loaded, lookup.out, without or (), seeds=seeds, progress=True, engine=engine)
-    return _print_checked(lines, as_json, case=loaded.name, without=without or [])
+    if cycles is not None:
+        try:
+            loaded = with_cycles(loaded, cycles)
+        except ValueError as error:
+            raise input_error("--cycles", str(error)) from error
+    lines = crosscheck(loaded, lookup.out, terms, seeds=seeds, progress=True, engine=engine)
+    name = loaded.name
+    print_as(
+        as_json,
+        lambda: as_dict(lines, case=name, without=terms),
+        lambda: lines_text(lines),
+    )
+    return 1 if failures(lines) else 0
 
 
 def library(name: Annotated[str | None, Parameter(name="NAME")] = None, /) -> None:
-    """List materials, liquids, friction, bridge laws, cases, sweeps and calibrations, or print one with its sources.
+    """List materials, liquids, friction, bridge laws, cases, sweeps and calibrations, or print one
+    with its sources.
 
     Parameters
     ----------
     name
         A material, a liquid, a bridge law, a case, a sweep or a calibration.
     """
-    from walkers.commands.catalogue import catalogue, catalogue_text, describe_one
+    from walkers.commands.catalogue import catalogue, catalogue_text, entry_text
 
     entries = catalogue()
-    print(describe_one(entries, name) if name else catalogue_text(entries))
+    print(entry_text(entries, name) if name else catalogue_text(entries))
 
 
 def calibrate(
@@ -142,7 +150,8 @@ def calibrate(
     jobs: JobsOption = None,
     engine: EngineOption = None,
 ) -> int:
-    """Calibrate unknown parameters to measured or published values. An interrupted calibration continues.
+    """Calibrate unknown parameters to measured or published values. An interrupted calibration
+    continues.
 
     Parameters
     ----------
@@ -153,8 +162,10 @@ def calibrate(
     from walkers.files import read_json
 
     outcome = walkers.calibrate(calibration, out, jobs=jobs, progress=True, engine=engine)
-    tell(*(f"{name}: {len(failures)} points failed" for name, failures in outcome.failures.items()))
-    files = write_outcome(outcome, out / outcome.calibration.name)
-    print(calibration_summary(read_json(out / outcome.calibration.name / CALIBRATION_NAME)))
+    for name, failures in outcome.failures.items():
+        tell(f"{name}: {len(failures)} points failed")
+    folder = out / outcome.calibration.name
+    files = write_outcome(outcome, folder)
+    print(calibration_summary(read_json(folder / CALIBRATION_NAME)))
     print_lines(files)
-    return 0  # a set whose run fails is an outcome: it counts as far off
+    return 0  # a set of parameters whose run fails is no failure: it counts as far off
