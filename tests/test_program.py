@@ -335,7 +335,8 @@ def test_the_table_of_commands_says_what_they_do(command: Command) -> None:
     if isinstance(function, App):  # with commands of its own, which have docstrings
         assert list(function), command.name
     else:
-        assert function.__doc__.splitlines()[0] == command.summary
+        first_paragraph = function.__doc__.partition("\n\n")[0]
+        assert " ".join(first_paragraph.split()) == command.summary
 
 
 def test_every_public_function_of_the_modules_of_commands_is_a_command() -> None:

@@ -1,7 +1,7 @@
 """The commands of the program, in the order of ``walkers --help``.
 
-The module of a command is imported when the command is called: ``walkers --help`` needs this table alone. ``check``
-has commands of its own.
+The module of a command is imported when the command is called: ``walkers --help`` needs this table
+alone. ``check`` has commands of its own.
 """
 
 from __future__ import annotations
@@ -10,7 +10,19 @@ from typing import NamedTuple
 
 
 class Command(NamedTuple):
-    """A command: its name, its heading in the help, ``module:function``, and its summary."""
+    """A command of the program.
+
+    Attributes
+    ----------
+    name
+        What the user types.
+    heading
+        Its heading in the help.
+    place
+        ``module:function``.
+    summary
+        What it does; the first paragraph of the function's docstring.
+    """
 
     name: str
     heading: str
@@ -25,95 +37,132 @@ _CHECK = "Check and calibrate"
 
 ALL_COMMANDS = (
     Command(
-        "new",
-        _RUN,
-        "walkers.commands.run:new",
-        "Write a commented case file as a starting point.",
+        name="new",
+        heading=_RUN,
+        place="walkers.commands.run:new",
+        summary="Write a commented case file as a starting point.",
     ),
     Command(
-        "show",
-        _RUN,
-        "walkers.commands.run:show",
-        "Show all values of a case with their sources, the forces, the time step and the predicted run time.",
+        name="show",
+        heading=_RUN,
+        place="walkers.commands.run:show",
+        summary=(
+            "Show all values of a case with their sources, the forces, the time step and "
+            "the predicted run time."
+        ),
     ),
     Command(
-        "run",
-        _RUN,
-        "walkers.commands.run:run",
-        "Run cases and print the results. A finished run is only printed, an interrupted run continues.",
+        name="run",
+        heading=_RUN,
+        place="walkers.commands.run:run",
+        summary=(
+            "Run cases and print the results. A finished run is only printed, an "
+            "interrupted run continues."
+        ),
     ),
     Command(
-        "sweep",
-        _RUN,
-        "walkers.commands.run:sweep",
-        "Run the missing points of a sweep on all cores or on a cluster. Exit status 1 if a point fails.",
+        name="sweep",
+        heading=_RUN,
+        place="walkers.commands.run:sweep",
+        summary=(
+            "Run the missing points of a sweep on all cores or on a cluster. Exit status 1 "
+            "if a point fails."
+        ),
     ),
     Command(
-        "list",
-        _LOOK,
-        "walkers.commands.look:list_",
-        "List runs and sweeps with status, result, age and size, or print the table of one sweep.",
+        name="list",
+        heading=_LOOK,
+        place="walkers.commands.look:list_",
+        summary=(
+            "List runs and sweeps with status, result, age and size, or print the table of "
+            "one sweep."
+        ),
     ),
     Command(
-        "plot",
-        _LOOK,
-        "walkers.commands.look:plot",
-        "Plot a run (path, orientation and gait of walkers; climbs of piles) or a column of a sweep's table.",
+        name="plot",
+        heading=_LOOK,
+        place="walkers.commands.look:plot",
+        summary=(
+            "Plot a run (path, orientation and gait of walkers; climbs of piles) or a "
+            "column of a sweep's table."
+        ),
     ),
     Command(
-        "render",
-        _LOOK,
-        "walkers.commands.look:render",
-        "Render pictures of a run at several times, or a film with --film.",
+        name="render",
+        heading=_LOOK,
+        place="walkers.commands.look:render",
+        summary="Render pictures of a run at several times, or a film with --film.",
     ),
     Command(
-        "report",
-        _LOOK,
-        "walkers.commands.look:report",
-        "Write a self-contained HTML report: parameters, results, plots and a 3-D view of the motion.",
+        name="report",
+        heading=_LOOK,
+        place="walkers.commands.look:report",
+        summary=(
+            "Write a self-contained HTML report: parameters, results, plots and a 3-D view "
+            "of the motion."
+        ),
     ),
     Command(
-        "compare",
-        _LOOK,
-        "walkers.commands.look:compare",
-        "Compare two runs or cases in parameters and results; --set changes the second case.",
+        name="compare",
+        heading=_LOOK,
+        place="walkers.commands.look:compare",
+        summary=(
+            "Compare two runs or cases in parameters and results; --set changes the second case."
+        ),
     ),
     Command(
-        "climb",
-        _LOOK,
-        "walkers.commands.look:climb",
-        "Print probability, rate and speed of climbs in piles for each condition, with confidence intervals.",
+        name="climb",
+        heading=_LOOK,
+        place="walkers.commands.look:climb",
+        summary=(
+            "Print probability, rate and speed of climbs in piles for each condition, with "
+            "confidence intervals."
+        ),
     ),
     Command(
-        "export",
-        _KEEP,
-        "walkers.commands.keep:export",
-        "Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, or an archive to publish.",
+        name="export",
+        heading=_KEEP,
+        place="walkers.commands.keep:export",
+        summary=(
+            "Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, "
+            "or an archive to publish."
+        ),
     ),
     Command(
-        "clean",
-        _KEEP,
-        "walkers.commands.keep:clean",
-        "Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay.",
+        name="clean",
+        heading=_KEEP,
+        place="walkers.commands.keep:clean",
+        summary=(
+            "Remove interrupted and failed runs, or the given runs and sweeps. Asks first. "
+            "Runs in progress stay."
+        ),
     ),
     Command(
-        "check",
-        _CHECK,
-        "walkers.commands.check:check",
-        "Check the engine, the contact model, one case, or files. Exit status 1 if something differs.",
+        name="check",
+        heading=_CHECK,
+        place="walkers.commands.check:check",
+        summary=(
+            "Check the engine, the contact model, one case, or files. Exit status 1 if "
+            "something differs."
+        ),
     ),
     Command(
-        "library",
-        _CHECK,
-        "walkers.commands.check:library",
-        "List materials, liquids, friction, bridge laws, cases, sweeps and calibrations, "
-        "or print one with its sources.",
+        name="library",
+        heading=_CHECK,
+        place="walkers.commands.check:library",
+        summary=(
+            "List materials, liquids, friction, bridge laws, cases, sweeps and "
+            "calibrations, or print one with its sources."
+        ),
     ),
     Command(
-        "calibrate",
-        _CHECK,
-        "walkers.commands.check:calibrate",
-        "Calibrate unknown parameters to measured or published values. An interrupted calibration continues.",
+        name="calibrate",
+        heading=_CHECK,
+        place="walkers.commands.check:calibrate",
+        summary=(
+            "Calibrate unknown parameters to measured or published values. An interrupted "
+            "calibration continues."
+        ),
     ),
 )
-"""Summaries are the first lines of the functions' docstrings."""
+"""All commands in the order of ``walkers --help``."""
