@@ -1,18 +1,21 @@
-"""Options that several commands share, and functions that print."""
+"""Arguments and options that several commands share, and functions that print.
+
+The texts of ``help`` are what ``walkers COMMAND --help`` prints.
+"""
 
 from __future__ import annotations
 
 import json
 import shutil
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 from cyclopts.validators import Number
-from cyclopts.validators import Path as OfPath
+from cyclopts.validators import Path as PathValidator
 
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import input_error
@@ -23,28 +26,41 @@ if TYPE_CHECKING:
     from walkers.api import Run, Sweep
 
 
-def _names(context: CompletionContext) -> list[str]:
-    """For the completion of a shell: case files, shipped cases, and what is in the folder of runs."""
+def _completions(context: CompletionContext) -> list[str]:
+    """Names that a shell completes: case files, shipped cases, runs and sweeps in ``--out``."""
     from walkers.inputs.reading import shipped
 
     out = Path(context["out"].raw or DEFAULT_OUT)
-    records = sorted(
-        path.parent.name for file in RECORDS.values() for path in out.glob(f"*/{file}")
-    )
-    return [*(path.name for path in Path().glob("*.toml")), *shipped("case"), *records]
+    records: list[Path] = []
+    for record_name in RECORDS.values():
+        records += out.glob(f"*/{record_name}")
+    in_folder = sorted(record.parent.name for record in records)
+    case_files = [path.name for path in Path().glob("*.toml")]
+    return [*case_files, *shipped("case"), *in_folder]
+
+
+def _check_engine(_: object, name: str | None) -> None:
+    """Refuse a binary that is not on this machine before anything is done."""
+    if name and shutil.which(name) is None:
+        raise input_error(f"--engine {name}", "expected the name or path of a liggghts binary")
 
 
 AT_LEAST_1 = Number(gte=1)
+"""Validator of a number of parallel decks, or of starts."""
 NOT_NEGATIVE = Number(gte=0)
+"""Validator of a time limit, s."""
 _CASE = "A case file, the name of a shipped case such as fig1b, or a run (name or folder)."
 _RUN = "its folder, its name in --out, or its case (file or name)."
-CaseArgument = Annotated[str, Parameter(name="CASE", completer=_names, help=_CASE)]
-RunArgument = Annotated[str, Parameter(name="RUN", completer=_names, help=f"A run: {_RUN}")]
+
+CaseArgument = Annotated[str, Parameter(name="CASE", completer=_completions, help=_CASE)]
+RunArgument = Annotated[str, Parameter(name="RUN", completer=_completions, help=f"A run: {_RUN}")]
 RunOrSweepArgument = Annotated[
-    str, Parameter(name="RUN|SWEEP", completer=_names, help=f"A run or a sweep: {_RUN}")
+    str, Parameter(name="RUN|SWEEP", completer=_completions, help=f"A run or a sweep: {_RUN}")
 ]
-Folder = Annotated[Path, Parameter(validator=OfPath(file_okay=False))]
-OutOption = Annotated[Folder, Parameter(help="Folder that contains the runs.")]
+OutOption = Annotated[
+    Path,
+    Parameter(validator=PathValidator(file_okay=False), help="Folder that contains the runs."),
+]
 JobsOption = Annotated[
     int | None,
     Parameter(
@@ -58,12 +74,15 @@ FormatsOption = Annotated[
     list[str] | None,
     Parameter("--format", help="Format of the figures: png, svg or pdf. Repeatable."),
 ]
+EngineOption = Annotated[
+    str | None, Parameter(validator=_check_engine, help="Name or path of the liggghts binary.")
+]
 
 
 @Parameter(name="*")
 @dataclass(frozen=True)
 class LookupOptions:
-    """The folder of runs, and new values of the case.
+    """Where a name is looked up, and new values of the case that it means.
 
     Parameters
     ----------
@@ -82,13 +101,13 @@ class LookupOptions:
         return settings_of(self.changes or ())
 
     def load(self, name: str) -> Run | Sweep:
-        """The named sweep or run."""
+        """The named run or sweep."""
         from walkers.api import load
 
         return load(name, self.out, self.values)
 
     def run(self, name: str) -> Run:
-        """The named run."""
+        """The named run; `InputError` if the name is that of a sweep."""
         from walkers.api import Run
         from walkers.runs.names import not_a_run
 
@@ -98,32 +117,33 @@ class LookupOptions:
         return loaded
 
 
-def _check_engine(_: object, name: str | None) -> None:
-    """Refuse a binary that is not on this machine before anything is done."""
-    if name and shutil.which(name) is None:
-        raise input_error(f"--engine {name}", "expected the name or path of a liggghts binary")
+def refuse(option: str, is_wrong: bool, reason: str) -> None:
+    """Raise an `InputError` with a reason if an option is wrong."""
+    if is_wrong:
+        raise input_error(option, reason)
 
 
-EngineOption = Annotated[
-    str | None, Parameter(validator=_check_engine, help="Name or path of the liggghts binary.")
-]
+def refuse_any(options: Mapping[str, Any], reason: str) -> None:
+    """Raise an `InputError` with a reason if one of several options is given.
 
-
-def refuse(option: str, wrong: bool, why: str) -> None:
-    """Raise an `InputError` with the reason if an option is ``wrong``."""
-    if wrong:
-        raise input_error(option, why)
-
-
-def refuse_any(given: dict[str, Any], why: str) -> None:
-    """Raise an `InputError` with the reason if one of these options is given."""
-    if option := next((name for name, value in given.items() if value), None):
-        raise input_error(f"--{option.replace('_', '-')}", why)
+    Parameters
+    ----------
+    options
+        Values by the names of the options in Python; a false value is an option that is not given.
+    reason
+        Why none of them may be given.
+    """
+    for name, value in options.items():
+        if value:
+            raise input_error(f"--{name.replace('_', '-')}", reason)
 
 
 def print_as(as_json: bool, value: Callable[[], Any], text: Callable[[], str]) -> None:
-    """Print a value as JSON, or its text."""
-    print(json.dumps(value(), indent=2, ensure_ascii=False) if as_json else text())
+    """Print a value as JSON, or its text; only what is printed is computed."""
+    if as_json:
+        print(json.dumps(value(), indent=2, ensure_ascii=False))
+    else:
+        print(text())
 
 
 def print_lines(lines: Iterable[object]) -> None:
@@ -133,6 +153,6 @@ def print_lines(lines: Iterable[object]) -> None:
 
 
 def tell(*messages: str) -> None:
-    """Print messages on standard error."""
+    """Print messages on standard error, a line each."""
     for message in messages:
         print(f"walkers: {message}", file=sys.stderr, flush=True)
