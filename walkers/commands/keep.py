@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -59,32 +59,50 @@ def export(
     lookup: LookupOptions = LookupOptions(),
     options: ExportOptions = ExportOptions(),
 ) -> None:
-    """Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, or an archive to publish.
+    """Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, or an archive
+    to publish.
 
     Parameters
     ----------
     form
-        Format of the export. deck: LIGGGHTS deck of the case. vtk: .vtu files, their .pvd, and the script show.py that
-        shows them in ParaView. lammps: the trajectory as a LAMMPS dump, for OVITO, ASE, MDAnalysis. archive: a zip
-        file with checksums, to publish.
+        Format of the export. deck: LIGGGHTS deck of the case. vtk: .vtu files, their .pvd, and the
+        script show.py that shows them in ParaView. lammps: the trajectory as a LAMMPS dump, for
+        OVITO, ASE, MDAnalysis. archive: a zip file with checksums, to publish.
     to
-        File or folder to write; default: in the run's folder, archives in the current folder. Decks are printed.
+        File or folder to write; default: in the run's folder, archives in the current folder.
+        Decks are printed.
     """
-    given = {option: value for option, value in vars(options).items() if value not in (None, False)}
-    if "dumps" in given:
-        given["dumps"] = False
-    if form != "deck":
+    given = _given(options)
+    if form == "deck":
+        writer_of(form, given)  # refuses options of other formats
+        _export_deck(name, to, lookup)
+    else:
         print(lookup.load(name).export(form, to, **given))
-        return
-    writer_of(form, given)
-    named = find(name, lookup.out, lookup.values)
-    case = as_run(named.case, named.finished_run)
+
+
+def _given(options: ExportOptions) -> dict[str, Any]:
+    """The options that the user has given, as arguments of `walkers.Run.export`."""
+    given: dict[str, Any] = {}
+    if options.every:
+        given["every"] = options.every
+    if options.dumps:  # the option is --without-dumps
+        given["dumps"] = False
+    if options.authors is not None:
+        given["authors"] = options.authors
+    if options.licence is not None:
+        given["licence"] = options.licence
+    return given
+
+
+def _export_deck(name: str, to: Path | None, lookup: LookupOptions) -> None:
+    """Print the deck of a case, or write its folder; with the cycles that its finished run took."""
+    reference = find(name, lookup.out, lookup.values)
+    case = as_run(reference.case, reference.finished_run)
     if to is None:
         print(render_deck(case, single_segment(case)).text, end="")
     else:
-        print(
-            f"{write_folder(case, to)}    run it there with: sh {RUN_NAME}    then: walkers run {to}"
-        )
+        deck = write_folder(case, to)
+        print(f"{deck}    run it there with: sh {RUN_NAME}    then: walkers run {to}")
     if case.run.continuation:
         tell(f"{case.run.attempts[0]} cycles; {case.run.continuation}")
 
@@ -94,7 +112,8 @@ def clean(
     out: OutOption = DEFAULT_OUT,
     yes: Annotated[bool, Parameter(("--yes", "-y"))] = False,
 ) -> int:
-    """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in progress stay.
+    """Remove interrupted and failed runs, or the given runs and sweeps. Asks first. Runs in
+    progress stay.
 
     Parameters
     ----------
@@ -115,18 +134,21 @@ def clean(
             print("nothing removed")
             return 0
     left = remove(removals)
-    tell(*(f"{path}: {reason}" for path, reason in left.items()))
+    for path, reason in left.items():
+        tell(f"{path}: {reason}")
     return 1 if left else 0
 
 
 def _removals(names: Sequence[str], out: Path) -> list[Removal]:
+    """The named runs and sweeps; without names, all unfinished work in the folder of runs."""
     if not names:
         return unfinished_in(out)
-    return named_in(out, apply_all(partial(_place_of, out=out), names))
+    directories = apply_all(partial(_directory_to_remove, out=out), names)
+    return named_in(out, directories)
 
 
-def _place_of(name: str, out: Path) -> Path:
-    """The directory of a named run or sweep; the name may be that of the directory of an unfinished run."""
+def _directory_to_remove(name: str, out: Path) -> Path:
+    """The directory of a named run or sweep, or the directory of an unfinished run of this name."""
     path = Path(name)
     if path.suffix != UNFINISHED:
         return directory_of(name, out)

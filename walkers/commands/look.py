@@ -56,22 +56,24 @@ def list_(
         _list_points(sweep, out, to, as_json)
         return
     refuse("--to", to is not None, "expected a sweep, whose table is written")
-    contents = listing.inventory(out)
-    shown = contents if every else listing.without_members(contents)
-    hidden = len(contents) - len(shown)
+    entries = listing.inventory(out)
+    shown = entries if every else listing.without_members(entries)
+    hidden = len(entries) - len(shown)
     if where:
-        shown = select([entry for entry in contents if entry.kind == "run"], where)
+        runs = [entry for entry in entries if entry.kind == "run"]
+        shown = select(runs, where)
         hidden = 0
     print_as(as_json, lambda: listing.as_json(shown), lambda: listing.listing_text(shown, hidden))
 
 
 def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
+    """Print the points of a sweep, or write its table."""
     from walkers.api import Sweep
     from walkers.runs.names import find
     from walkers.sweeps import table
 
-    named = find(name, out)
-    kind = named.kind
+    reference = find(name, out)
+    kind = reference.kind
     refuse(name, kind == "run", f"is a run: walkers run {name} prints its result")
     refuse(name, kind == "case", f"no sweep in {out}; walkers list shows what is there")
     refuse(
@@ -79,14 +81,14 @@ def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
         kind != "sweep",
         f"not a sweep: expected a folder with a sweep.json (walkers list --out {name}?)",
     )
-    found_sweep = Sweep(named.path)
+    sweep = Sweep(reference.path)
     if to is not None:
-        table.write_table_file(found_sweep.table(), to)
+        table.write_table_file(sweep.table(), to)
         print(to)
     elif as_json:
-        print(table.encoded(found_sweep.table(), "json").decode(), end="")
+        print(table.encoded(sweep.table(), "json").decode(), end="")
     else:
-        print(found_sweep.describe())
+        print(sweep.describe())
 
 
 def plot(
@@ -98,7 +100,8 @@ def plot(
     options: FigureOptions = FigureOptions(),
     formats: FormatsOption = None,
 ) -> None:
-    """Plot a run (path, orientation and gait of walkers; climbs of piles) or a column of a sweep's table.
+    """Plot a run (path, orientation and gait of walkers; climbs of piles) or a column of a sweep's
+    table.
 
     Parameters
     ----------
@@ -139,10 +142,9 @@ def render(
         refuse("--images", images is not None, "is for pictures, not for --film")
         print(lookup.run(run).film(to, progress=True, **vars(options)))
         return
-    usual = vars(FilmOptions(walker=options.walker))
-    refuse_any(
-        {name: value != usual[name] for name, value in vars(options).items()}, "is for --film"
-    )
+    defaults = vars(FilmOptions(walker=options.walker))
+    changed = {name: value != defaults[name] for name, value in vars(options).items()}
+    refuse_any(changed, "is for --film")
     print_lines(
         lookup.run(run).render(to, images=6 if images is None else images, walker=options.walker)
     )
@@ -187,12 +189,14 @@ def climb(
     to: Path | None = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Print probability, rate and speed of climbs in piles for each condition, with confidence intervals.
+    """Print probability, rate and speed of climbs in piles for each condition, with confidence
+    intervals.
 
     Parameters
     ----------
     within
-        Count climbs up to this time of the drive, such as '5 s'; default: end of the shortest run without a climb.
+        Count climbs up to this time of the drive, such as '5 s'; default: end of the shortest run
+        without a climb.
     to
         Write the figure (.png, .svg, .pdf) or the table (.csv) to this file.
     """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -25,10 +25,15 @@ from walkers.errors import apply_all
 from walkers.progress import progress_of
 from walkers.rounding import duration_text
 
-_MANY = 10_000
-"""Number of points of a sweep that take long enough to say so."""
+if TYPE_CHECKING:
+    from walkers.inputs.sweep import SweepDefinition
+    from walkers.sweeps.scheduler import SweepOptions
+    from walkers.sweeps.spread import Spread
+
+_MANY_POINTS = 10_000
+"""Number of points of a sweep above which the time to resolve them is told in advance."""
 _RESOLVED_PER_SECOND = 2_000
-"""Number of points that take seconds to resolve."""
+"""Number of points that are resolved in a second."""
 
 
 def new(
@@ -45,7 +50,8 @@ def new(
     name
         Name of the case; the file is NAME.toml.
     case
-        Shipped case to copy: fig1b (a walker), climber, cluster, tray, pile-small, ... (list: walkers library).
+        Shipped case to copy: fig1b (a walker), climber, cluster, tray, pile-small, ... (list:
+        walkers library).
     schema
         Also write case.schema.json, which editors use.
     """
@@ -60,7 +66,8 @@ def show(
     theory: bool = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Show all values of a case with their sources, the forces, the time step and the predicted run time.
+    """Show all values of a case with their sources, the forces, the time step and the predicted
+    run time.
 
     Parameters
     ----------
@@ -68,12 +75,7 @@ def show(
         Print the theory's prediction, with the result of the run if it exists.
     """
     if theory:
-        from walkers.theory.prediction_text import prediction_text
-
-        predicted = walkers.predict(case, lookup.out, lookup.values)
-        print_as(
-            as_json, lambda: predicted, lambda: prediction_text(predicted, predicted["engine"])
-        )
+        _show_theory(case, lookup, as_json)
         return
     from walkers.runs.names import find
     from walkers.runs.preview import preview_text, summarise
@@ -82,12 +84,25 @@ def show(
     print_as(as_json, lambda: summary, lambda: preview_text(summary))
 
 
-def _draws(spread: bool, points: int | None) -> int:
-    """Number of runs of a spread; 0 for none."""
+def _show_theory(case: str, lookup: LookupOptions, as_json: bool) -> None:
+    from walkers.theory.prediction import prediction_text
+
+    prediction = walkers.predict(case, lookup.out, lookup.values)
+    print_as(
+        as_json,
+        lambda: prediction,
+        lambda: prediction_text(prediction, prediction["engine"]),
+    )
+
+
+def _number_of_draws(spread: bool, points: int | None) -> int:
+    """Number of runs of a spread; 0 without ``--spread``."""
     from walkers.sweeps.spread import POINTS
 
     refuse("--points", points is not None and not spread, "is for --spread")
-    return (POINTS if points is None else points) if spread else 0
+    if not spread:
+        return 0
+    return POINTS if points is None else points
 
 
 def run(
@@ -101,7 +116,8 @@ def run(
     accuracy: bool = False,
     engine: EngineOption = None,
 ) -> int:
-    """Run cases and print the results. A finished run is only printed, an interrupted run continues.
+    """Run cases and print the results. A finished run is only printed, an interrupted run
+    continues.
 
     Parameters
     ----------
@@ -114,33 +130,36 @@ def run(
     points
         Number of runs for --spread; default: 32.
     accuracy
-        Also run with smaller time steps and harder beads, and print the numerical error of the result.
+        Also run with smaller time steps and harder beads, and print the numerical error of the
+        result.
     """
     from walkers.api import case_to_run, finished_at
     from walkers.runner.failures import EngineFailure
     from walkers.runs.names import find
     from walkers.runs.preview import notes
     from walkers.sweeps.accuracy import times_of
-    from walkers.sweeps.spread import spread_sweep, spread_text
+    from walkers.sweeps.spread import spread_sweep
 
     refuse("CASE", not cases, "expected a case, such as fig1b")
-    draws = _draws(spread, points)
+    draws = _number_of_draws(spread, points)
     # Report a mistake in the last file before the first run starts.
-    named = [find(case, lookup.out, lookup.values) for case in cases]
-    finished = [None for _ in named] if force else apply_all(finished_at, named)
-    loaded = apply_all(case_to_run, zip(named, finished, strict=True))
+    references = [find(case, lookup.out, lookup.values) for case in cases]
+    finished_runs: list[walkers.Run | None] = [None] * len(references)
+    if not force:
+        finished_runs = apply_all(finished_at, references)
+    loaded = apply_all(case_to_run, zip(references, finished_runs, strict=True))
     if accuracy:
         apply_all(times_of, loaded)
     if spread:
         for case in loaded:
-            list(spread_sweep(case, draws, engine).cases())  # also an unusable range
+            list(spread_sweep(case, draws, engine).cases())  # refuses an unusable range
     failed = False
-    for reference, case, earlier in zip(named, loaded, finished, strict=True):
-        folder = reference.folder
-        tell(*(f"{case.name}: {note}" for note in notes(case) if earlier is None))
+    for reference, case, finished_run in zip(references, loaded, finished_runs, strict=True):
+        if finished_run is None:
+            tell(*[f"{case.name}: {note}" for note in notes(case)])
         try:
-            done = earlier or walkers.run(
-                case, folder, engine=engine, force=force, progress=True, time_limit=limit
+            done = finished_run or walkers.run(
+                case, reference.folder, engine=engine, force=force, progress=True, time_limit=limit
             )
         except EngineFailure as failure:
             tell(f"{case.name}: {failure}")
@@ -148,23 +167,29 @@ def run(
             continue
         if accuracy:
             done.accuracy(progress=True, engine=engine)
-        band = done.spread(draws, progress=True, engine=engine) if spread else None
-        failed |= bool(band and band.failures)
-        if as_json:
-            ranges = {"spread": band.as_dict()} if band else {}
-            print(
-                json.dumps(
-                    {
-                        **done.result.as_dict(),
-                        **ranges,
-                        "run": str(done.directory),
-                        "cached": done.cached,
-                    }
-                )
-            )
-        else:
-            print_lines([done.describe(), *([spread_text(band)] if band else [])])
+        band: Spread | None = None
+        if spread:
+            band = done.spread(draws, progress=True, engine=engine)
+            failed |= bool(band.failures)
+        _print_run(done, band, as_json)
     return 1 if failed else 0
+
+
+def _print_run(run: walkers.Run, band: Spread | None, as_json: bool) -> None:
+    """Print the result of a run and, if it has one, the band of its spread; as JSON on one line."""
+    from walkers.sweeps.spread import spread_text
+
+    if not as_json:
+        print(run.describe())
+        if band is not None:
+            print(spread_text(band))
+        return
+    contents = run.result.as_dict()
+    if band is not None:
+        contents["spread"] = band.as_dict()
+    contents["run"] = str(run.directory)
+    contents["cached"] = run.cached
+    print(json.dumps(contents))
 
 
 def sweep(
@@ -180,7 +205,8 @@ def sweep(
     points: int | None = None,
     engine: EngineOption = None,
 ) -> int:
-    """Run the missing points of a sweep on all cores or on a cluster. Exit status 1 if a point fails.
+    """Run the missing points of a sweep on all cores or on a cluster. Exit status 1 if a point
+    fails.
 
     Parameters
     ----------
@@ -189,43 +215,34 @@ def sweep(
     site
         Site file of a cluster to run on: TOML for SLURM, or Python with a configuration of Parsl.
     dry_run
-        Print the plan and its predicted cost, and run nothing. A site file in Python is executed all the same.
+        Print the plan and its predicted cost, and run nothing. A site file in Python is executed
+        all the same.
     limit
         Time limit in s for each deck.
     spread
-        Also run each point with its uncertain values drawn from their ranges: plots of the sweep show the bands.
+        Also run each point with its uncertain values drawn from their ranges: plots of the sweep
+        show the bands.
     points
         Number of runs of each point for --spread; default: 32.
     """
     from walkers.inputs.sweep import load_sweep
     from walkers.postprocess.measure.uncertainty import lines_of_rest, rests_on
-    from walkers.sweeps.scheduler import SweepOptions, plan_sweep
+    from walkers.sweeps.scheduler import SweepOptions
     from walkers.sweeps.site import load_site
-    from walkers.sweeps.spread import spread_sweep
 
-    draws = _draws(spread, points)
+    draws = _number_of_draws(spread, points)
     loaded = load_sweep(sweep, lookup.values)
     refuse(
         "--jobs",
         jobs is not None and site is not None,
         "the site file sets how many decks run at once",
     )
-    if len(loaded.rows) > _MANY:
+    if len(loaded.rows) > _MANY_POINTS:
         duration = duration_text(len(loaded.rows) / _RESOLVED_PER_SECOND)
         tell(f"{loaded.name}: resolving {len(loaded.rows)} points, which takes about {duration}")
     if dry_run:
         options = SweepOptions(jobs, load_site(site) if site else None)
-        with progress_of(loaded.name) as advance:
-            plan = plan_sweep(loaded, lookup.out, options, engine, advance)
-        print(plan.as_text())
-        if spread:
-            sweeps = (spread_sweep(case, draws, engine) for case in loaded.cases())
-            plans = [plan_sweep(drawn, lookup.out, options, engine) for drawn in sweeps]
-            seconds, more = (
-                sum(plan.core_seconds for plan in plans),
-                sum(len(plan.missing) for plan in plans),
-            )
-            print(f"  spread     {more} more runs, predicted {seconds:.0f} core-seconds")
+        _print_plan(loaded, lookup.out, options, engine, draws if spread else None)
         return 0
     done = walkers.sweep(
         sweep,
@@ -238,10 +255,32 @@ def sweep(
         spread=draws,
         engine=engine,
     )
-    tell(*(f"point {failure.point}, {failure.run}: {failure.message}" for failure in done.failures))
+    for failure in done.failures:
+        tell(f"point {failure.point}, {failure.run}: {failure.message}")
     print(f"{done.summary()}\n  table      walkers list {done.directory}")
-    origins = next(loaded.cases()).origins  # the table has the values of varied keys
-    print_lines(
-        lines_of_rest(rests_on([origin for origin in origins if origin.key not in loaded.keys]))
-    )
+    # The table has the values of the keys that vary.
+    origins = next(loaded.cases()).origins
+    of_all_points = [origin for origin in origins if origin.key not in loaded.keys]
+    print_lines(lines_of_rest(rests_on(of_all_points)))
     return 1 if done.failures else 0
+
+
+def _print_plan(
+    sweep: SweepDefinition, out: Path, options: SweepOptions, engine: str | None, draws: int | None
+) -> None:
+    """Print what a sweep would run, and with ``draws`` the cost of a spread of each point."""
+    from walkers.sweeps.scheduler import plan_sweep
+    from walkers.sweeps.spread import spread_sweep
+
+    with progress_of(sweep.name) as advance:
+        plan = plan_sweep(sweep, out, options, engine, advance)
+    print(plan.as_text())
+    if draws is None:
+        return
+    seconds = 0.0
+    missing = 0
+    for case in sweep.cases():
+        plan = plan_sweep(spread_sweep(case, draws, engine), out, options, engine)
+        seconds += plan.core_seconds
+        missing += len(plan.missing)
+    print(f"  spread     {missing} more runs, predicted {seconds:.0f} core-seconds")
