@@ -120,7 +120,7 @@ def _equals(key: str, value: Any, text: str) -> bool:
 
 @cache
 def quantity_kind(key: str) -> QuantityKind | None:
-    """The kind of quantity of a key of a case, such as ``dimers.radii[0]``; None for pure numbers."""
+    """The kind of quantity of a key, such as ``dimers.radii[0]``; None for pure numbers."""
     for name, field in dotted_keys(CaseFile).items():
         if _last_two_parts(name) == _last_two_parts(key):
             kind = units.kind_in([*field.metadata, field.annotation])

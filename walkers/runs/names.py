@@ -24,7 +24,9 @@ from walkers.runner.failures import EngineMissing
 from walkers.runner.manifest import read_manifest
 
 NotARun = Literal["sweep", "calibration", "archive", "deck", "folder"]
+"""Kinds of names for which there is no single run."""
 NameKind = Literal["run", "case"] | NotARun
+"""What a name may mean; a deck is one that was run by hand, a folder one without a run."""
 Given: TypeAlias = "Case | str | Path | Mapping[str, Any]"
 """What may stand for a case: a resolved case, its file or name, or its tables."""
 Changes: TypeAlias = "Mapping[str, Any] | None"
@@ -37,6 +39,7 @@ _NOT_A_RUN: Mapping[NotARun, str] = {
     "sweep": "is a sweep: expected one of its runs; walkers list, plot and report take sweeps",
     "archive": "an archive: unpack it and give a run or a sweep in it",
 }
+"""Why a name of a kind is refused where a run is expected."""
 
 
 def not_a_run(name: object, kind: NotARun) -> InputError:
@@ -55,8 +58,8 @@ class Reference:
     kind
         What it is, without the changes: changed, a run is another case.
     path
-        Where it is: the final directory of a run that is not finished, the name of a shipped case,
-        the folder ``out`` of a case that is given by itself.
+        Where it is. For a run that is not finished, its final directory; for a shipped case, its
+        name; for a case that is given itself, the folder ``out``.
     out
         Folder of the run directories.
     changes
@@ -96,8 +99,9 @@ class Reference:
         if self.kind == "run":
             return changed_case(readable_case(self.path), self.changes)
         if self.kind in ("sweep", "calibration"):
-            # A file of a sweep or a calibration is refused with what it is, a directory as not being a case.
-            find_input(str(given) if is_sweep_file(Path(given)) else self.path, "case")
+            # `find_input` refuses a file with what it is, and a directory as not being a case.
+            source = str(given) if is_sweep_file(Path(given)) else self.path
+            find_input(source, "case")
             raise not_a_run(given, self.kind)
         if self.kind == "folder":
             raise input_error(given, "is a folder without a run")
@@ -149,7 +153,17 @@ def find(
 
 
 def _meanings(path: Path, out: Path, *, is_shipped: bool) -> Iterator[tuple[NameKind, Path]]:
-    """What a path may mean, and where that is, the most likely first; whether it is the name of a shipped case."""
+    """What a path may mean, and where that is, the most likely first.
+
+    Parameters
+    ----------
+    path
+        What the user gave.
+    out
+        Folder of the run directories.
+    is_shipped
+        Whether it is the name of a shipped case.
+    """
     kinds: tuple[NameKind, ...] = ("run", "sweep", "calibration")
     for place in (path, out / path):
         for kind in kinds:
@@ -160,18 +174,20 @@ def _meanings(path: Path, out: Path, *, is_shipped: bool) -> Iterator[tuple[Name
             yield "run", complete
         if run_directory.is_deck_folder(place) and not is_shipped:
             yield "deck", place
-    if (out / path.stem / RECORDS["sweep"]).is_file() and is_sweep_file(path):
-        yield "sweep", out / path.stem
+    sweep = out / path.stem
+    if (sweep / RECORDS["sweep"]).is_file() and is_sweep_file(path):
+        yield "sweep", sweep
     if path.suffix == ".zip" and path.is_file():
         yield "archive", path
-    yield "folder" if path.is_dir() and not is_shipped else "case", path
+    if path.is_dir() and not is_shipped:
+        yield "folder", path
+    yield "case", path
 
 
 def is_begun(place: Path) -> bool:
     """Whether a place belongs to a running or interrupted run."""
-    return (
-        run_directory.unfinished(place) / run_directory.CASE_NAME
-    ).is_file() or run_directory.is_locked(place)
+    case = run_directory.unfinished(place) / run_directory.CASE_NAME
+    return case.is_file() or run_directory.is_locked(place)
 
 
 def readable_case(directory: Path) -> Case:
@@ -191,10 +207,9 @@ def readable_case(directory: Path) -> Case:
     if is_finished:
         with refusing(directory, "the run's manifest.json"):
             read_manifest(directory)
+    current = directory if is_finished else run_directory.unfinished(directory)
     with refusing(directory, "the run's case.json"):
-        case = run_directory.case_of(
-            directory if is_finished else run_directory.unfinished(directory)
-        )
+        case = run_directory.case_of(current)
     if is_finished:
         with refusing(directory, "the run's layout.json"):
             run_directory.read_layout(run_directory.segment_directories(directory)[0])
@@ -203,7 +218,15 @@ def readable_case(directory: Path) -> Case:
 
 @contextmanager
 def refusing(directory: Path, contents: str) -> Iterator[None]:
-    """Turn the errors of a damaged file into one `InputError`."""
+    """Turn the errors of damaged files into an `InputError`.
+
+    Parameters
+    ----------
+    directory
+        What the message is about.
+    contents
+        What is read in the block, for the message.
+    """
     try:
         yield
     except (
