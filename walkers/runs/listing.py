@@ -36,6 +36,7 @@ from walkers.runs.status import state_at
 from walkers.text import aligned
 
 _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
+"""Bytes in the units of sizes, the largest first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,22 +125,27 @@ def folders_in(out: Path) -> list[Path]:
 
 def place_of(directory: Path) -> Path:
     """The final directory of a run, beside which its lock is."""
-    name = directory.name.removesuffix(run_directory.UNFINISHED).removesuffix(
-        run_directory.REPLACED
-    )
-    return directory.with_name(name)
+    name = directory.name.removesuffix(run_directory.UNFINISHED)
+    return directory.with_name(name.removesuffix(run_directory.REPLACED))
 
 
 def _without_directory(out: Path, listed: set[Path]) -> list[ListEntry]:
-    """Runs in progress that have a lock alone: in a shared deck, or just before their directory is made."""
+    """Runs in progress that have a lock, but no directory.
+
+    They are in a shared deck, or their directory is about to be made.
+    """
     runs = []
     for lock in out.glob("*.lock"):
         place = lock.with_suffix("")
         if place not in listed and run_directory.is_locked(place):
-            case = place.name.rpartition("-")[0]
-            runs.append(
-                ListEntry(kind="run", name=place.name, case=case, status="running", directory=place)
+            entry = ListEntry(
+                kind="run",
+                name=place.name,
+                case=_case_name_of(place),
+                status="running",
+                directory=place,
             )
+            runs.append(entry)
     return runs
 
 
@@ -151,18 +157,27 @@ def entry_of(path: Path) -> ListEntry | None:
     if not finished and not is_run_name:
         return None
     case = _case_in(path)
-    if case is None:
+    if case is not None:
+        case_name = case.name
+        parameters = flattened(case)
+    else:
         holds_run = finished or (place != path and run_directory.holds_unfinished(path))
         if not is_run_name or not holds_run:
             return None
-    case_name = case.name if case else place.name.rpartition("-")[0]
-    parameters = flattened(case) if case else FlatCase()
+        case_name = _case_name_of(place)
+        parameters = FlatCase()
     if finished:
         return _finished(path, case_name, parameters)
     return _unfinished(path, case_name, parameters)
 
 
+def _case_name_of(place: Path) -> str:
+    """The name of the case in the name of a run directory."""
+    return place.name.rpartition("-")[0]
+
+
 def _case_in(path: Path) -> Case | None:
+    """The case of a run directory; None if it cannot be read."""
     try:
         return stored_case(read_json(path / run_directory.CASE_NAME))
     except (OSError, ValueError, KeyError, TypeError):
@@ -170,8 +185,12 @@ def _case_in(path: Path) -> Case | None:
 
 
 def _finished(path: Path, case: str, parameters: FlatCase) -> ListEntry:
+    """A finished run; without numbers if its result cannot be read, and with the reason."""
     size, _ = weigh(path)
-    numbers, velocity, text, reason = None, None, "-", None
+    numbers = None
+    velocity = None
+    text = "-"
+    reason: str | None
     try:
         results = read_results(path)
     except InputError as error:
@@ -207,10 +226,12 @@ def _remark(results: Results) -> str | None:
 
 
 def _unfinished(path: Path, case: str, parameters: FlatCase) -> ListEntry:
+    """A run in progress, an interrupted run or a failed run."""
     place = place_of(path)
     size, changed = weigh(path)
     state = state_at(place, path)
-    status, reason = state.status, state.reason
+    status = state.status
+    reason = state.reason
     if status == "missing":
         status = "interrupted"
         reason = state.message
@@ -283,17 +304,35 @@ def select(runs: Sequence[ListEntry], where: Iterable[str]) -> list[ListEntry]:
     for condition in where:
         answers = [has_value(run.parameters, condition) for run in selected]
         if selected and all(answer is None for answer in answers):
-            keys = short_keys(sorted({key for run in selected for key in run.parameters}))
-            near = suggestion(condition.partition("=")[0].strip(), keys)
-            text = f'"{condition}": no run has such a key{near}; runs have {", ".join(keys)}'
-            raise input_error("where", text)
+            raise _no_such_key(condition, selected)
         selected = [run for run, answer in zip(selected, answers, strict=True) if answer]
     return selected
 
 
+def _no_such_key(condition: str, runs: Sequence[ListEntry]) -> InputError:
+    """The error for a condition whose key no run has, with the keys that runs have."""
+    keys: set[str] = set()
+    for run in runs:
+        keys.update(run.parameters)
+    names = short_keys(sorted(keys))
+    near = suggestion(condition.partition("=")[0].strip(), names)
+    text = f'"{condition}": no run has such a key{near}; runs have {", ".join(names)}'
+    return input_error("where", text)
+
+
 @dataclass(frozen=True)
 class RunsOfCase:
-    """The runs of a case, and the keys by which they differ, without those that follow from given ones."""
+    """The runs of a case.
+
+    Attributes
+    ----------
+    case
+        Name of the case.
+    runs
+        Its runs.
+    keys
+        Keys in which the runs differ, without those that follow from others.
+    """
 
     case: str
     runs: Sequence[ListEntry]
@@ -313,7 +352,7 @@ class RunsOfCase:
 
 
 def by_case(runs: Sequence[ListEntry]) -> list[RunsOfCase]:
-    """The runs of each case together."""
+    """The runs of each case, in the order in which the cases first occur."""
     runs_of: dict[str, list[ListEntry]] = {}
     for run in runs:
         runs_of.setdefault(run.case, []).append(run)

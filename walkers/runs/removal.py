@@ -24,11 +24,15 @@ from walkers.runs.listing import ListEntry, bytes_text, place_of, runs_in, weigh
 from walkers.text import aligned
 
 _MOST_LINES = 40
+"""Largest number of removals that are listed one by one."""
 _IN_PROGRESS = "kept: a process is computing it"
 
 
 class RemovalKind(Enum):
-    """What is removed; an unfinished export is a folder that a killed export to VTK left."""
+    """What is removed.
+
+    An unfinished export is a folder that a killed export to VTK left.
+    """
 
     RUN = "run"
     SWEEP = "sweep"
@@ -64,12 +68,13 @@ class Removal:
 
 
 def unfinished_in(out: Path) -> list[Removal]:
-    """What a folder of runs contains of unfinished work, without runs in progress.
+    """Unfinished work in a folder of runs, without runs in progress.
 
     These are interrupted and failed runs, locks without a process, and folders of killed exports.
     """
     runs = runs_in(out)
-    removals = [removal_of(run) for run in runs if run.status != "finished" and is_removable(run)]
+    unfinished = [run for run in runs if run.status != "finished" and is_removable(run)]
+    removals = [removal_of(run) for run in unfinished]
     removals += [Removal(lock, RemovalKind.LOCK) for lock in _stale_locks(out)]
     removals += [Removal(folder, RemovalKind.EXPORT) for folder in _abandoned_exports(out, runs)]
     return removals
@@ -94,6 +99,7 @@ def removal_of(run: ListEntry) -> Removal:
 
 
 def _stale_locks(out: Path) -> list[Path]:
+    """Lock files of runs that no process is computing."""
     locks = [lock for lock in sorted(out.glob("*.lock")) if run_directory.is_run_name(lock.stem)]
     return [lock for lock in locks if not run_directory.is_locked(lock.with_suffix(""))]
 
@@ -110,7 +116,7 @@ def _abandoned_exports(out: Path, runs: Sequence[ListEntry]) -> list[Path]:
 
 
 def removal_text(removals: Sequence[Removal]) -> str:
-    """What is to be removed, a line each with the time since its last change, and the total size."""
+    """What is to be removed: a line each with the time since its last change; the total size."""
     now = time.time()
     lines = []
     numbers = Counter[str]()
@@ -164,6 +170,7 @@ def _remove(removal: Removal) -> str:
 
 
 def _remove_run(directory: Path) -> str:
+    """Remove a run directory under the lock of the run; return why it is left, or an empty text."""
     place = place_of(directory)
     with run_directory.locked([place]) as ours:
         if not ours:
@@ -177,7 +184,7 @@ def _remove_run(directory: Path) -> str:
 
 
 def _remove_contents(directory: Path, *, keep: str) -> None:
-    """Remove what a directory contains but the entry with a name."""
+    """Remove everything in a directory except the entry with the name ``keep``."""
     for entry in sorted(directory.iterdir()):
         if entry.name == keep:
             continue
