@@ -38,7 +38,7 @@ from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.runner.run_directory import case_of, locked
 from walkers.runs.case_text import readable
 from walkers.runs.comparison import Side, compare_runs
-from walkers.runs.listing import bytes_text, weigh
+from walkers.runs.listing import bytes_text, size_and_last_change
 from walkers.runs.removal import remove, unfinished_in
 from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.removal import named_in
@@ -231,7 +231,7 @@ def test_clean_keeps_runs_that_other_sweeps_have(out: Path) -> None:
         name: {Path(run).name for run in walkers.load(out / name).table()["run"]} for name in names
     }
     before = finished_places(out)
-    size = bytes_text(sum(weigh(out / name)[0] for name in ("grid", "rough")))
+    size = bytes_text(sum(size_and_last_change(out / name)[0] for name in ("grid", "rough")))
     assert (
         f"2 sweeps to remove, {size}" in call("clean", "grid", "rough", "--yes", check=True).stdout
     )

@@ -92,7 +92,7 @@ class ListEntry:
     parameters: FlatCase = field(default_factory=FlatCase)
 
     @property
-    def weight(self) -> list[str]:
+    def age_and_size(self) -> list[str]:
         """Age and size as text."""
         return [duration_text(self.age), bytes_text(self.size)]
 
@@ -186,7 +186,7 @@ def _case_in(path: Path) -> Case | None:
 
 def _finished(path: Path, case: str, parameters: FlatCase) -> ListEntry:
     """A finished run; without numbers if its result cannot be read, and with the reason."""
-    size, _ = weigh(path)
+    size, _ = size_and_last_change(path)
     numbers = None
     velocity = None
     text = "-"
@@ -228,7 +228,7 @@ def _remark(results: Results) -> str | None:
 def _unfinished(path: Path, case: str, parameters: FlatCase) -> ListEntry:
     """A run in progress, an interrupted run or a failed run."""
     place = place_of(path)
-    size, changed = weigh(path)
+    size, changed = size_and_last_change(path)
     state = state_at(place, path)
     status = state.status
     reason = state.reason
@@ -261,7 +261,7 @@ def run_text(directory: Path) -> str:
     return f"{run.status}, {run.result}".removesuffix(", -")
 
 
-def weigh(path: Path) -> tuple[int, float]:
+def size_and_last_change(path: Path) -> tuple[int, float]:
     """Size and time of the last change of a file, or of all files in a directory.
 
     Files with several names, such as tables that the segments of a pile share, count once.
@@ -347,7 +347,7 @@ class RunsOfCase:
             if run.reason:
                 status = f"{run.status}: {run.reason}"
             values = [readable(key, run.parameters.get(key)) for key in self.keys]
-            lines.append([run.name, status, run.result, *run.weight, *values])
+            lines.append([run.name, status, run.result, *run.age_and_size, *values])
         return aligned(lines)
 
 

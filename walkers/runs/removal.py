@@ -20,7 +20,7 @@ from walkers.rounding import counted, duration_text
 from walkers.runner import run_directory
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runner.run_directory import CASE_NAME
-from walkers.runs.listing import ListEntry, bytes_text, place_of, runs_in, weigh
+from walkers.runs.listing import ListEntry, bytes_text, place_of, runs_in, size_and_last_change
 from walkers.text import aligned
 
 _MOST_LINES = 40
@@ -122,7 +122,7 @@ def removal_text(removals: Sequence[Removal]) -> str:
     numbers = Counter[str]()
     total = 0
     for removal in removals:
-        size, changed = weigh(removal.path)
+        size, changed = size_and_last_change(removal.path)
         if removal.path.is_symlink():
             size = 0
         age = duration_text(max(now - changed, 0.0))

@@ -118,7 +118,7 @@ def _sweeps_text(sweeps: Sequence[ListEntry]) -> str:
     for sweep in sweeps:
         varied = ", ".join(f"{key} ({number})" for key, number in sweep.parameters.items())
         status = status_text(sweep.points or {})
-        lines.append([sweep.name, status, *sweep.weight, sweep.case, varied])
+        lines.append([sweep.name, status, *sweep.age_and_size, sweep.case, varied])
     return aligned(lines)
 
 
