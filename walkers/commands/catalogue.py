@@ -138,7 +138,9 @@ def _table(kind: str, entries: Sequence[Entry]) -> str:
     rows = [[kind.capitalize(), *heads, ""]]
     for entry in entries:
         cells = [_cell(entry.numbers, column) for column in columns]
-        note = f"{entry.text} [{entry.place}]" if entry.place else entry.text
+        note = entry.text
+        if entry.place:
+            note += f" [{entry.place}]"
         rows.append([f"  {entry.name}", *cells, note.strip()])
     return aligned(rows)
 
@@ -182,7 +184,9 @@ def entry_text(entries: Sequence[Entry], name: str) -> str:
 
 def _entry_lines(entry: Entry) -> list[str]:
     """The name of an entry with its text and origin, how to use it, and its numbers."""
-    heading = f"{entry.name}: {entry.text}" if entry.text else entry.name
+    heading = entry.name
+    if entry.text:
+        heading += f": {entry.text}"
     if entry.place:
         heading += f" [{entry.place}]"
     lines = [heading]

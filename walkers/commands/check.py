@@ -139,7 +139,10 @@ def library(name: Annotated[str | None, Parameter(name="NAME")] = None, /) -> No
     from walkers.commands.catalogue import catalogue, catalogue_text, entry_text
 
     entries = catalogue()
-    print(entry_text(entries, name) if name else catalogue_text(entries))
+    if name:
+        print(entry_text(entries, name))
+    else:
+        print(catalogue_text(entries))
 
 
 def calibrate(

@@ -145,9 +145,8 @@ def render(
     defaults = vars(FilmOptions(walker=options.walker))
     changed = {name: value != defaults[name] for name, value in vars(options).items()}
     refuse_any(changed, "is for --film")
-    print_lines(
-        lookup.run(run).render(to, images=6 if images is None else images, walker=options.walker)
-    )
+    number = 6 if images is None else images
+    print_lines(lookup.run(run).render(to, images=number, walker=options.walker))
 
 
 def report(

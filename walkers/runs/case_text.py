@@ -98,10 +98,13 @@ def has_value(case: Mapping[str, Any], condition: str) -> bool | None:
     if not key or not text:
         expected = 'expected KEY=VALUE, such as "drive.frequency=80 Hz"'
         raise input_error("where", f'"{condition}": {expected}')
-    matching = [name for name in case if f".{name}".endswith(f".{key}")]
-    if not matching:
-        return None
-    return any(_equals(name, case[name], text.strip('"')) for name in matching)
+    answer = None
+    for name, value in case.items():
+        if f".{name}".endswith(f".{key}"):
+            if _equals(name, value, text.strip('"')):
+                return True
+            answer = False
+    return answer
 
 
 def _equals(key: str, value: Any, text: str) -> bool:
@@ -109,13 +112,21 @@ def _equals(key: str, value: Any, text: str) -> bool:
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not is_number or text == str(value):
         return text.lower() in (readable(key, value).lower(), str(value).lower())
-    kind = quantity_kind(key)
     try:
-        number = float(text) if kind is None else units.parse_quantity(text, kind)
+        number = _parsed(text, quantity_kind(key))
     except ValueError as error:
-        reason = "expected a number without a unit" if kind is None else error
-        raise input_error("where", f'"{key}={text}": {reason}') from error
+        raise input_error("where", f'"{key}={text}": {error}') from error
     return isclose(number, value, rel_tol=_SAME_VALUE)
+
+
+def _parsed(text: str, kind: QuantityKind | None) -> float:
+    """A text as a number in SI units; `ValueError` says what was expected."""
+    if kind is not None:
+        return units.parse_quantity(text, kind)
+    try:
+        return float(text)
+    except ValueError as error:
+        raise ValueError("expected a number without a unit") from error
 
 
 @cache
@@ -183,8 +194,10 @@ def short_keys(keys: Sequence[str], reserved: Iterable[str] = ("name",)) -> list
     taken = set(reserved).difference(keys)
     short = []
     for key, last_part in zip(keys, last_parts, strict=True):
-        is_ambiguous = last_part in taken or last_parts.count(last_part) > 1
-        short.append(key if is_ambiguous else last_part)
+        if last_part in taken or last_parts.count(last_part) > 1:
+            short.append(key)
+        else:
+            short.append(last_part)
     return short
 
 

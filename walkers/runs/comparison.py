@@ -128,10 +128,8 @@ def compare_runs(first: Side, second: Side) -> Comparison:
 
     Results are compared if both sides have a finished run.
     """
-    sides = (first, second)
-    not_run = [side.name for side in sides if side.directory is None]
     parameters = _differing_parameters(first.case, second.case)
-    parameters_text = _parameters_text(parameters, [side.name for side in sides])
+    parameters_text = _parameters_text(parameters, [first.name, second.name])
     results_text: list[str] = []
     numbers: list[_ComparedNumber] = []
     if first.directory and second.directory:
@@ -143,10 +141,14 @@ def compare_runs(first: Side, second: Side) -> Comparison:
         results_text = _results_text(numbers, runs)
         if not parameters:
             parameters_text += _cycles_text(numbers, runs)
-    other_tables = [side.name for side in sides if _has_other_bridge_tables(side)]
-    text = [parameters_text, *results_text]
-    text += [f"{name}: {_OTHER_BRIDGE_TABLES}" for name in other_tables]
-    text += [f"{name}: no finished run; only the parameters are compared" for name in not_run]
+    paragraphs = [parameters_text, *results_text]
+    not_run = []
+    for side in (first, second):
+        if _has_other_bridge_tables(side):
+            paragraphs.append(f"{side.name}: {_OTHER_BRIDGE_TABLES}")
+        if side.directory is None:
+            paragraphs.append(f"{side.name}: no finished run; only the parameters are compared")
+            not_run.append(side.name)
     contents = {
         "first": first.name,
         "second": second.name,
@@ -155,18 +157,25 @@ def compare_runs(first: Side, second: Side) -> Comparison:
         "not_run": not_run,
         "results": [json_numbers(asdict(number)) for number in numbers],
     }
-    return Comparison(contents, "\n\n".join(text))
+    return Comparison(contents, "\n\n".join(paragraphs))
 
 
 def _differing_parameters(first: Case, second: Case) -> list[_Parameter]:
     """The keys whose values differ: those that a case gives, then those that follow from others."""
-    cases = [flattened(first), flattened(second)]
-    given, implied = differing(cases)
+    first_values = flattened(first)
+    second_values = flattened(second)
+    given, implied = differing([first_values, second_values])
     parameters = []
     for key in [*given, *implied]:
-        values = [case.get(key) for case in cases]
-        origin_words = [case.origin_words.get(key) for case in cases]
-        parameters.append(_Parameter(key, values, origin_words))
+        parameter = _Parameter(
+            key,
+            values=[first_values.get(key), second_values.get(key)],
+            origin_words=[
+                first_values.origin_words.get(key),
+                second_values.origin_words.get(key),
+            ],
+        )
+        parameters.append(parameter)
     return parameters
 
 
@@ -177,7 +186,10 @@ def _parameters_text(parameters: Sequence[_Parameter], names: Sequence[str]) -> 
     rows = [["parameter", *names, "source"]]
     for parameter in parameters:
         values = [readable(parameter.key, value) for value in parameter.values]
-        sources = dict.fromkeys(word for word in parameter.origin_words if word)
+        sources: list[str] = []
+        for word in parameter.origin_words:
+            if word and word not in sources:
+                sources.append(word)
         rows.append([parameter.key, *values, " / ".join(sources)])
     return aligned(rows)
 
@@ -238,7 +250,7 @@ def _compared_number(name: str, unit: str, first: Results, second: Results) -> _
     value_of_first = _number(first.get(name))
     value_of_second = _number(second.get(name))
     scatter = scatter_of(name)
-    errors = [results.get(f"{name}_error", nan) for results in (first, second)]
+    error = f"{name}_error"
     return _ComparedNumber(
         quantity=name,
         unit=unit,
@@ -247,7 +259,7 @@ def _compared_number(name: str, unit: str, first: Results, second: Results) -> _
         first_scatter=first.get(scatter),
         second_scatter=second.get(scatter),
         difference=value_of_second - value_of_first,
-        numerical_error=hypot(*errors),
+        numerical_error=hypot(first.get(error, nan), second.get(error, nan)),
     )
 
 
@@ -263,8 +275,13 @@ def _number(value: Any) -> float:
 
 def _results_text(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]) -> list[str]:
     """Paragraphs: numbers that differ, their errors, warnings of the runs, numbers that do not."""
-    differing_numbers = [number for number in numbers if number.differs]
-    same = [number.quantity for number in numbers if not number.differs]
+    differing_numbers = []
+    same = []
+    for number in numbers:
+        if number.differs:
+            differing_numbers.append(number)
+        else:
+            same.append(number.quantity)
     paragraphs = []
     if differing_numbers:
         paragraphs += _table_of_numbers(differing_numbers, runs)
@@ -296,15 +313,17 @@ def _table_of_numbers(
     numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]
 ) -> list[str]:
     """A table of numbers without empty columns, and what its scatter means if it has one."""
-    rows = [_cells(number, runs) for number in numbers]
     names = [run.name for run in runs]
     heads = ["result", *names, "difference", "scatter of copies", "numerical error"]
+    rows = [_cells(number, runs) for number in numbers]
     columns = []
+    has_scatter = False
     for head, *cells in zip(heads, *rows, strict=True):
         if set(cells) != {_DASH}:
             columns.append((head, *cells))
+            has_scatter |= head == "scatter of copies"
     paragraphs = [aligned(list(zip(*columns, strict=True)))]
-    if "scatter of copies" in [head for head, *_ in columns]:
+    if has_scatter:
         paragraphs.append(
             "scatter of copies: how much copies differ by their start; no error of the difference"
         )
@@ -341,17 +360,14 @@ def _printed_values(number: _ComparedNumber, runs: Sequence[_FinishedRun]) -> li
     If only one of them is a mean over the walkers that face up, the value says so.
     """
     unit, factor = unit_shown(number.unit)
-    texts = [rounded(factor * value, unit) for value in (number.first, number.second)]
     facing_up = [is_of_up(declared(number.quantity), run.results) for run in runs]
-    if all(facing_up):
-        return texts
-    marked = []
-    for text, is_facing_up in zip(texts, facing_up, strict=True):
-        if is_facing_up and text != _DASH:
-            marked.append(f"{text} facing up")
-        else:
-            marked.append(text)
-    return marked
+    texts = []
+    for value, is_facing_up in zip((number.first, number.second), facing_up, strict=True):
+        text = rounded(factor * value, unit)
+        if is_facing_up and not all(facing_up) and text != _DASH:
+            text += " facing up"
+        texts.append(text)
+    return texts
 
 
 def _signed_difference(number: _ComparedNumber) -> str:
@@ -398,7 +414,8 @@ def _band_lines(runs: Sequence[_FinishedRun]) -> list[str]:
         band = _band_text(run.results)
         if band:
             lines.append(f"{run.name}: {band}")
-    shared = set.intersection(*[_uncertain_keys(run.results) for run in runs])
+    first, second = runs
+    shared = _uncertain_keys(first.results) & _uncertain_keys(second.results)
     if shared:
         belong = "belongs" if len(shared) == 1 else "belong"
         values = f"{counted(len(shared), 'uncertain value')} {belong} to both runs"
@@ -411,7 +428,12 @@ def _band_lines(runs: Sequence[_FinishedRun]) -> list[str]:
 
 def _uncertain_keys(results: Results) -> set[str]:
     """Keys of the uncertain values on which a result rests."""
-    return {value["key"] for value in results.about["rests_on"] if value["range"]}
+    return {value["key"] for value in _uncertain_values(results)}
+
+
+def _uncertain_values(results: Results) -> list[dict[str, Any]]:
+    """The values with a range on which a result rests."""
+    return [value for value in results.about["rests_on"] if value["range"]]
 
 
 def _band_text(results: Results) -> str:
@@ -428,7 +450,7 @@ def _band_text(results: Results) -> str:
             return f"{with_unit(main, unit)}, {band}"
     if not not_computed(results).uncertain_values:
         return ""
-    uncertain = [value["origin"] for value in results.about["rests_on"] if value["range"]]
-    rests = f"{main} rests on {counted(len(uncertain), 'uncertain value')}"
-    guessed = f"{uncertain.count('default')} guessed"
+    origins = [value["origin"] for value in _uncertain_values(results)]
+    rests = f"{main} rests on {counted(len(origins), 'uncertain value')}"
+    guessed = f"{origins.count('default')} guessed"
     return f"{rests}, {guessed}; the band over the ranges is not computed (--spread)"

@@ -224,11 +224,15 @@ def _contacts(case: Case, walkers: Walkers) -> list[dict[str, Any]]:
 def _time_step(case: Case) -> dict[str, Any]:
     """The time step and its limits in s, and the shares of the limits."""
     step = case.run.time_step
-    limits = vars(limits_of(case))
+    limits: dict[str, float | None] = {}
+    shares = {}
+    for name, limit in vars(limits_of(case)).items():
+        limits[name] = limit if isfinite(limit) else None
+        shares[name] = step / limit
     return {
         "step": step,
-        "limits": {name: limit if isfinite(limit) else None for name, limit in limits.items()},
-        "share": {name: step / limit for name, limit in limits.items()},
+        "limits": limits,
+        "share": shares,
         "auto": dict(FRACTIONS[case.loose]),
     }
 

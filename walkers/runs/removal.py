@@ -94,14 +94,18 @@ def removal_of(run: ListEntry) -> Removal:
     if run.directory.is_symlink():
         remark = "a symbolic link: its target stays"
     elif run.status == "interrupted":
-        remark = f"{run.reason}, can be continued" if run.reason else "can be continued"
+        remark = f"{remark}, can be continued".removeprefix(", ")
     return Removal(run.directory, RemovalKind.RUN, run.status, remark)
 
 
 def _stale_locks(out: Path) -> list[Path]:
     """Lock files of runs that no process is computing."""
-    locks = [lock for lock in sorted(out.glob("*.lock")) if run_directory.is_run_name(lock.stem)]
-    return [lock for lock in locks if not run_directory.is_locked(lock.with_suffix(""))]
+    locks = []
+    for lock in sorted(out.glob("*.lock")):
+        place = lock.with_suffix("")
+        if run_directory.is_run_name(place.name) and not run_directory.is_locked(place):
+            locks.append(lock)
+    return locks
 
 
 def _abandoned_exports(out: Path, runs: Sequence[ListEntry]) -> list[Path]:
@@ -134,8 +138,8 @@ def removal_text(removals: Sequence[Removal]) -> str:
         texts.append(aligned(lines[:_MOST_LINES]))
     if len(lines) > _MOST_LINES:
         texts.append(f"and {len(lines) - _MOST_LINES} more")
-    kinds = ", ".join(counted(number, label) for label, number in numbers.items())
-    texts.append(f"{kinds or 'nothing'} to remove, {bytes_text(total)}")
+    kinds = [counted(number, label) for label, number in numbers.items()]
+    texts.append(f"{', '.join(kinds) or 'nothing'} to remove, {bytes_text(total)}")
     return "\n".join(texts)
 
 
