@@ -207,4 +207,5 @@ def _comparable(value: Any) -> Hashable:
         return tuple(_comparable(item) for item in value)
     if isinstance(value, float):
         return float(f"{value:.{_COMPARED_DIGITS}g}")
-    return value
+    hashable: Hashable = value
+    return hashable
