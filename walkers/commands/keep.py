@@ -83,7 +83,7 @@ def export(
 def _given(options: ExportOptions) -> dict[str, Any]:
     """The options that the user has given, as arguments of `walkers.Run.export`."""
     given: dict[str, Any] = {}
-    if options.every:
+    if options.every is not None:
         given["every"] = options.every
     if options.dumps:  # the option is --without-dumps
         given["dumps"] = False
