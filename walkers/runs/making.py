@@ -68,7 +68,7 @@ class _LaunchOptions:
     locks
         File descriptors of the locks of the runs, which the engine inherits.
     on_progress
-        Is called a few times per second.
+        Called a few times per second with the progress of the runs.
     time_limit
         Wall time of a segment or a shared deck, s; None: no limit.
     """
@@ -106,7 +106,7 @@ def make_runs(  # noqa: PLR0913
     dumps
         Whether the runs that are made keep their dumps.
     on_progress
-        Is called a few times per second.
+        Called a few times per second with the progress of the runs.
     time_limit
         Wall time of a segment, s.
 
@@ -331,7 +331,7 @@ class OpenRun:
         Parameters
         ----------
         on_progress
-            Is called a few times per second.
+            Called a few times per second with the progress of the run.
         time_limit
             Wall time of each segment, s.
         render
@@ -358,17 +358,17 @@ class OpenRun:
                 return
 
     def _remove_shorter_attempt(self, case: Case) -> None:
-        """Remove the segment of an attempt with fewer cycles than a case has."""
+        """Remove the segment of an earlier attempt, which has fewer cycles than the case."""
         if self.case.run.until_steady and self.done and self.done[-1]["end"] < case.run.steps:
             for directory in run_directory.segment_directories(self.directory):
                 shutil.rmtree(directory)
             self.done.clear()
 
     def _ends_with_lost_beads(self, segment: Segment) -> bool:
-        """Whether beads that leave the container in a segment end the experiment, and are no
-        failure.
+        """Whether beads that leave the container in a segment end the experiment.
 
-        The drive must have begun in an earlier segment: these segments are valid.
+        They do in a container whose drive began before the segment: earlier segments are valid.
+        Otherwise the loss of beads is a failure.
         """
         drive_from = run_directory.drive_from(self.case, self.done)
         has_begun = drive_from is not None and segment.begin > drive_from
