@@ -139,10 +139,10 @@ def make_runs(  # noqa: PLR0913
         if len(missing) == 1:
             ((place, case),) = missing.items()
             _make_alone(case, place, options, anew=force)
-            made = [place.name]
+            completed = [place.name]
         else:
-            made = _make_in_shared_decks(missing, out, options)
-        for name in made:
+            completed = _make_in_shared_decks(missing, out, options)
+        for name in completed:
             runs[name] = True
             if not dumps:
                 run_directory.leave_out_dumps(out / name)
@@ -579,15 +579,15 @@ def _make_in_shared_decks(
     cycles.
     """
     left = {place.name: case for place, case in missing.items()}
-    made: list[str] = []
+    completed: list[str] = []
     if not left:
-        return made
+        return completed
     attempts = next(iter(left.values())).run.attempts
     for cycles in attempts:
         if left:
-            made += _make_together(left, cycles, out, options)
-            left = {name: case for name, case in left.items() if name not in made}
-    return made
+            completed += _make_together(left, cycles, out, options)
+            left = {name: case for name, case in left.items() if name not in completed}
+    return completed
 
 
 def _make_together(
