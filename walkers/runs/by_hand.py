@@ -222,9 +222,9 @@ def _make_run_directory(folder: Path, deck: Path, log: Path) -> None:
     write_json(folder / run_directory.CASE_NAME, run.case.as_dict(), at_once=False)
     write_json(folder / decks.LAYOUT_NAME, rendered.layout.as_dict(), at_once=False)
     _write_segment_record(folder, run, report, notes)
-    doubt = _doubt_about_length(folder, run)
-    if doubt:
-        notes.append(doubt)
+    advice = _advice_on_length(folder, run)
+    if advice:
+        notes.append(advice)
         _write_segment_record(folder, run, report, notes)
     measure(folder)
     scaled_tables = folder / decks.SCALED_BRIDGES_NAME
@@ -246,15 +246,15 @@ def _make_run_directory(folder: Path, deck: Path, log: Path) -> None:
 def _write_segment_record(
     folder: Path, run: _RunByHand, report: EngineReport, notes: Sequence[str]
 ) -> None:
+    """Write the record of the only segment, with what the user should know about the run."""
     edited = bool(run.edits)
     run_directory.write_segment_record(
         folder, run.segment, report, by_hand=notes, deck_edited=edited
     )
 
 
-def _doubt_about_length(folder: Path, run: _RunByHand) -> str:
-    """Advice to run more cycles if the velocities are not constant; empty if the run is long
-    enough.
+def _advice_on_length(folder: Path, run: _RunByHand) -> str:
+    """Advice to run more cycles if the velocities are not constant; empty if they are.
 
     The cycles that were enough for the finished run of a case may be too few for an edited deck.
     The segment of the run must have been written.
@@ -268,7 +268,7 @@ def _doubt_about_length(folder: Path, run: _RunByHand) -> str:
         advice = f"set cycles to {planned.cycles}, as walkers run does, and run again"
     else:
         may_be_short = run.case.apart and run.case != run.written
-        advice = "set cycles to more and run again"
+        advice = "increase cycles and run again"
     if not may_be_short or are_constant(folder):
         return ""
     reached = f"the velocities are not constant within {percent(CONSTANT)} after {cycles} cycles"
