@@ -185,7 +185,7 @@ def _progress_of_shared_deck(folder: Path) -> Progress:
 
 def _progress_of_segment(directory: Path, case: Case) -> Progress:
     """Progress of a run whose segments are made one by one; `ValueError` if none is being made."""
-    done = [_read_segment(path) for path in run_directory.segment_directories(directory)]
+    done = _complete_segments(directory)
     (folder,) = (directory / run_directory.SEGMENTS).glob("*.new")
     run = case.run
     cycles = run.cycles
@@ -214,13 +214,13 @@ def share_kept(place: Path) -> float | None:
     directory = run_directory.unfinished(place)
     try:
         case = run_directory.case_of(directory)
-        segments = run_directory.segment_directories(directory)
-        if not segments:
+        done = _complete_segments(directory)
+        if not done:
             return 0.0
-        done = [_read_segment(path) for path in segments]
         cycles = case.run.cycles
         if case.run.until_steady:
-            cycles = run_directory.read_layout(segments[-1]).steps // case.run.steps_per_cycle
+            last = run_directory.segment_directories(directory)[-1]
+            cycles = run_directory.read_layout(last).steps // case.run.steps_per_cycle
     except (OSError, ValueError, KeyError, TypeError, WalkersError):
         return None
     end = int(done[-1]["end"])
@@ -508,7 +508,7 @@ def open_locked(
             (directory / run_directory.SEGMENTS).mkdir(parents=True, exist_ok=True)
             _remove_incomplete_files(directory)
             run_directory.write_case(directory, case)
-            done = [_read_segment(path) for path in run_directory.segment_directories(directory)]
+            done = _complete_segments(directory)
             yield OpenRun(case, engine, directory, place, locks, done)
     except Stopped:
         raise
@@ -531,6 +531,11 @@ def _remove_incomplete_files(directory: Path) -> None:
             path.unlink()
         elif path != segments:
             shutil.rmtree(path)
+
+
+def _complete_segments(directory: Path) -> list[dict[str, Any]]:
+    """The records of the complete segments of a run, in order."""
+    return [_read_segment(segment) for segment in run_directory.segment_directories(directory)]
 
 
 def _read_segment(directory: Path) -> dict[str, Any]:
@@ -556,7 +561,9 @@ def _check_restart(restart: Path, atoms: int) -> None:
 def _rms_velocity(log: Path) -> float | None:
     """The root mean square velocity (m/s) that a deck printed last; None if it printed none."""
     velocities = _RMS_VELOCITY.findall(log.read_bytes())
-    return float(velocities[-1]) if velocities else None
+    if not velocities:
+        return None
+    return float(velocities[-1])
 
 
 def _are_constant(directory: Path) -> bool:

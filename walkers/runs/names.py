@@ -119,7 +119,9 @@ class Reference:
                 place = run_directory.run_place(self.case, find_engine(), self.folder)
             except EngineMissing:
                 return None
-        return place if run_directory.is_finished(place) else None
+        if not run_directory.is_finished(place):
+            return None
+        return place
 
 
 def find(
