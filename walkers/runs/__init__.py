@@ -1,1 +1,4 @@
-"""One run: previewed, made, split, compared, taken in from a deck that was run by hand."""
+"""One run: its name, preview, making, status, comparison and removal; decks that are run by hand.
+
+Many runs are made and compared in `walkers.sweeps`.
+"""

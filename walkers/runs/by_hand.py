@@ -1,9 +1,8 @@
-"""Decks that are run by hand: write the folder of a deck, and make a run directory of it after the
-run.
+"""Decks that are run by hand: their folders, and run directories of them after the run.
 
-The folder becomes the run directory and its only segment. Its ``deck.json`` contains the case and
-the deck as they were written. The engine prints the parameters of the deck that it reads. Edited
-parameters become other values of the case; other edits are named in the result.
+The folder of a deck becomes the run directory and its only segment. Its ``deck.json`` contains the
+case and the deck as they were written. The engine prints the parameters of the deck that it reads.
+Edited parameters become other values of the case; other edits are named in the result.
 """
 
 from __future__ import annotations

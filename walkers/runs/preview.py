@@ -27,7 +27,7 @@ from walkers.text import aligned, printable
 _LOOSE_PACKING = 0.55
 """Share of the volume of a container that loosely packed beads fill."""
 _FASTEST_CLIMB = 12e-3
-"""m/s; none of about a hundred climbs in glycerol at the drive of the paper was faster."""
+"""Speed of the fastest of about a hundred climbs in glycerol at the drive of the paper, m/s."""
 _NEEDLESSLY_SHORT = 1e-2
 """Time step over the longest recommended one, below which a note says so."""
 _LONGER_THAN_RECOMMENDED = 1.01
