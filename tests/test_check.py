@@ -136,7 +136,7 @@ def test_bridges_are_the_law_between_its_knots() -> None:
     curve = by_name(case.liquid.law)(surfaces)
     for gap in np.linspace(0.0, 0.999 * curve.rupture, 777):
         expected = curve.forces(np.array([gap])).columns()[0]
-        assert kernels.bridge_forces(bridges, bridges.between[0, -1], gap) == pytest.approx(
+        assert kernels.bridge_forces(bridges, bridges.first_bridge[0, -1], gap) == pytest.approx(
             expected, rel=1e-8
         )
 

@@ -1,8 +1,11 @@
-"""The second engine: beads between walls that move freely, or follow a given motion step by step."""
+"""The second engine: beads between walls that move freely, or follow a given motion step by step.
+
+It makes the constants of a case for the compiled formulas of `walkers.second_engine.kernels`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import lru_cache
 from math import inf, log, pi, sqrt
 
@@ -19,10 +22,11 @@ from walkers.second_engine import kernels
 from walkers.second_engine.kernels import CELLS, BridgeSplines, Constants, State
 
 TERMS = ("capillary", "lubrication", "damping", "friction", "rolling-friction", "gravity", "drive")
-"""Terms that can be left out: pull and resistances of bridges, damping of contacts, the tangential contact force, the
-torque against rolling, weight, the inertial force of the frame."""
+"""Terms that can be left out: capillary force and viscous forces of bridges, damping of contacts,
+tangential contact force, torque against rolling, weight, inertial force of the frame."""
 _SKIN = 0.4
-"""Fraction of the smallest radius; neighbour lists are rebuilt when a bead has moved nearly half of it."""
+"""Skin of neighbour lists over the smallest radius. A list is rebuilt when a bead has moved by
+nearly half the skin."""
 
 
 class SecondEngine:
@@ -31,17 +35,28 @@ class SecondEngine:
     Parameters
     ----------
     case
-        Gives density, contacts, liquid, weight, drive, time step, and the walls unless others are given.
+        Gives density, contacts, liquid, weight, drive, time step, and the walls unless others are
+        given.
     radius : ndarray, shape (N,)
         Radii of the beads, m.
     start : ndarray, shape (N, 9)
-        Position (m), velocity (m/s) and spin (rad/s). Touching beads have a bridge; where liquid is conserved, bridges
-        between beads form from the next step on, as in LIGGGHTS. Springs are unstretched, films full.
-    clock, without
-        Number of the first step; the drive begins with step 0. `TERMS` that are left out.
+        Position (m), velocity (m/s) and spin (rad/s). Beads that touch have a bridge; where
+        liquid is conserved, bridges between beads form from the next step on, as in LIGGGHTS.
+        Springs are unstretched and films are full.
+    walls
+        Walls between which the beads move; empty: those of the case.
+    clock
+        Number of the step of the start; the drive begins at step 0.
+    without
+        Those of `TERMS` that are left out.
+
+    Raises
+    ------
+    InputError
+        If a wall is a facet of a mesh.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 (keyword-only, and described above)
         self,
         case: Case,
         radius: FloatArray,
@@ -53,105 +68,128 @@ class SecondEngine:
     ) -> None:
         self.clock = clock
         radius = np.ascontiguousarray(radius, dtype=np.float64)
-        self.constants = _constants(case, radius, walls or case.boundary.walls, without)
-        place, velocity, spin = (
-            np.array(start[:, column : column + 3], dtype=np.float64, order="C")
-            for column in (0, 3, 6)
-        )
-        beads = len(radius)
-        contacts = (beads, beads + len(self.constants.point))
-        self.state = State(
-            *(
-                place,
-                velocity,
-                spin,
-                np.zeros_like(place),
-                np.zeros_like(place),
-                np.ones(beads),
-                np.zeros(beads),
-            ),
-            *(
-                np.zeros((*contacts, 3)),
-                np.full(contacts, -1),
-                np.zeros((beads, beads), np.bool_),
-                place.copy(),
-            ),
-        )
-        kernels.look_around(self.constants, self.state)
+        strengths = {term: 0.0 if term in without else 1.0 for term in TERMS}
+        self.constants = _constants(case, radius, walls or case.boundary.walls, strengths)
+        self.state = _state(start, wall_count=len(self.constants.wall_point))
+        kernels.list_neighbours(self.constants, self.state)
         self.evaluate()
 
     def evaluate(self) -> None:
-        """Evaluate the forces at the present positions and velocities, as LIGGGHTS does at its start."""
-        kernels.forces(self.constants, self.state, self.clock, False)
+        """Evaluate the forces at the present positions, as LIGGGHTS does at its start."""
+        kernels.update_forces(self.constants, self.state, self.clock, False)
 
-    def run(self, steps: int, every: int) -> FloatArray:
-        """Integrate: position, velocity and spin after each ``every`` steps, shape (steps // every, N, 9)."""
-        frames = np.empty((steps // every, len(self.state.film), 9))
-        kernels.advance(self.constants, self.state, self.clock, every, frames)
-        self.clock += every * len(frames)
+    def run(self, steps: int, steps_per_frame: int) -> FloatArray:
+        """Integrate, and return frames.
+
+        Parameters
+        ----------
+        steps
+            Number of steps.
+        steps_per_frame
+            Number of steps between frames.
+
+        Returns
+        -------
+        ndarray, shape (steps // steps_per_frame, N, 9)
+            Position (m), velocity (m/s) and spin (rad/s).
+        """
+        frames = np.empty((steps // steps_per_frame, len(self.state.film), 9))
+        kernels.advance(self.constants, self.state, self.clock, steps_per_frame, frames)
+        self.clock += steps_per_frame * len(frames)
         return frames
 
     def follow(self, frame: FloatArray) -> FloatArray:
-        """Move the beads to a state (N, 9) at the next step; return forces (N) and torques (N m), (N, 6)."""
+        """Move the beads to a given state at the next step, and return what acts on them there.
+
+        Parameters
+        ----------
+        frame : ndarray, shape (N, 9)
+            Position (m), velocity (m/s) and spin (rad/s).
+
+        Returns
+        -------
+        ndarray, shape (N, 6)
+            Forces (N) and torques (N m).
+        """
         state = self.state
-        state.position[:], state.velocity[:], state.spin[:] = (
-            frame[:, :3],
-            frame[:, 3:6],
-            frame[:, 6:],
-        )
+        state.position[:] = frame[:, :3]
+        state.velocity[:] = frame[:, 3:6]
+        state.spin[:] = frame[:, 6:]
         self.clock += 1
-        kernels.look_around(self.constants, state)
-        kernels.forces(self.constants, state, self.clock, True)
+        kernels.list_neighbours(self.constants, state)
+        kernels.update_forces(self.constants, state, self.clock, True)
         return np.hstack([state.force, state.torque])
 
     def liquid(self) -> float:
         """Liquid on all beads and in all bridges, m³."""
-        bridges, held = self.constants.bridges, self.state.bridge
-        return float(bridges.liquid @ self.state.film + bridges.volume[held[held >= 0]].sum())
+        bridges = self.constants.bridges
+        present = self.state.bridge[self.state.bridge >= 0]
+        return float(bridges.liquid @ self.state.film + bridges.volume[present].sum())
 
 
-@lru_cache(maxsize=4096)
-def _splined(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
-    """A bridge's row of `Bridges.spans` and its splines; a kink may be at the scale."""
-    curve = law(surfaces)
-    end, scale = curve.rupture, curve.scale or surfaces.roughness
-    scale = scale if scale < end else 0.4 * end
-    middle = max(0.5 * end, 0.5 * (scale + end))
-    t = np.linspace(0.0, 1.0, CELLS + 1)
-    pieces = (scale * t, scale * (middle / scale) ** t, end - (end - middle) * (1.0 - t) ** 2)
-    splines = [
-        CubicSpline(CELLS * t, curve.forces(gaps).columns()).c.transpose(1, 0, 2) for gaps in pieces
-    ]
-    return np.array([curve.formation, scale, middle, end]), np.stack(splines)
-
-
-def _bridges(case: Case, radius: FloatArray, without: Collection[str]) -> BridgeSplines:
-    sizes, kind = np.unique(radius, return_inverse=True)
-    between, full = (
-        np.empty((len(sizes), len(sizes) + 1), dtype=np.int64),
-        np.zeros((len(sizes), len(sizes) + 1, 2)),
-    )
-    tables: list[tuple[FloatArray, FloatArray, float]] = []
-    for row, small in enumerate(sizes.tolist()):
-        between[row, :row], full[row, :row] = between[:row, row], full[:row, row, ::-1]
-        for column, large in list(enumerate([*sizes.tolist(), inf]))[row:]:
-            surfaces = surfaces_of(case, small, large)
-            between[row, column], full[row, column] = len(tables), surfaces.films[0]
-            tables += [
-                (*_splined(case.law, meeting), meeting.volume) for meeting in surfaces.volumes
-            ]
-    acts = np.array(
-        ["capillary" not in without, *["lubrication" not in without] * 4], dtype=np.float64
-    )
-    spans, splines, volumes = map(np.stack, zip(*tables, strict=True))
-    liquid = 4.0 / 3.0 * pi * radius**3 * case.liquid.of_bridges.volume_fraction
-    steps = 8 if case.liquid.conserved else 0
-    return BridgeSplines(
-        spans, splines * acts, kind.astype(np.int64), between, volumes, steps, full, liquid
+def _state(start: FloatArray, wall_count: int) -> State:
+    """The state of beads with full films, without contacts; ``start`` as for `SecondEngine`."""
+    beads = len(start)
+    contacts = (beads, beads + wall_count)
+    position = np.array(start[:, :3], dtype=np.float64, order="C")
+    return State(
+        position=position,
+        velocity=np.array(start[:, 3:6], dtype=np.float64, order="C"),
+        spin=np.array(start[:, 6:9], dtype=np.float64, order="C"),
+        force=np.zeros((beads, 3)),
+        torque=np.zeros((beads, 3)),
+        film=np.ones(beads),
+        previous_film=np.zeros(beads),
+        spring=np.zeros((*contacts, 3)),
+        bridge=np.full(contacts, -1),
+        neighbours=np.zeros((beads, beads), np.bool_),
+        listed_position=position.copy(),
     )
 
 
-def _rows_of(case: Case, walls: Sequence[Wall]) -> list[KernelRow]:
+def _constants(
+    case: Case, radius: FloatArray, walls: Sequence[Wall], strengths: Mapping[str, float]
+) -> Constants:
+    """The constants of a case for beads between walls.
+
+    ``strengths`` are factors of `TERMS`: 1, or 0 for terms that are left out.
+    """
+    contact = case.contact
+    modulus = contact.youngs_modulus
+    ratio = contact.poissons_ratio
+    loss = log(contact.restitution)
+    rows = _kernel_rows(case, walls)
+    harmonics, inertial_acceleration = _drive(case)
+    if not strengths["drive"]:
+        harmonics = np.zeros((0, 6))
+        inertial_acceleration = np.zeros((0, 3))
+    bridges = _bridges(case, radius, strengths)
+    skin = _SKIN * float(radius.min())
+    longest_bridge = bridges.spans[:, kernels.RUPTURE].max()
+    return Constants(
+        step=case.run.time_step,
+        radius=radius,
+        mass=4.0 / 3.0 * pi * radius**3 * case.beads.density,
+        wall_point=np.array([row.point for row in rows]).reshape(-1, 3),
+        wall_normal=np.array([row.normal for row in rows]).reshape(-1, 3),
+        cylinder_radius=np.array([row.radius for row in rows]),
+        gravity=np.array(case.gravity_vector) * strengths["gravity"],
+        harmonics=harmonics,
+        inertial_acceleration=inertial_acceleration,
+        modulus=modulus / (2.0 * (1.0 - ratio**2)),
+        shear_modulus=modulus / (4.0 * (1.0 + ratio) * (2.0 - ratio)),
+        damping=-loss / sqrt(loss**2 + pi**2) * strengths["damping"],
+        friction_beads=contact.friction.bead_bead * strengths["friction"],
+        friction_walls=contact.friction.bead_wall * strengths["friction"],
+        rolling=contact.rolling_friction * strengths["rolling-friction"],
+        search_radius=radius + (longest_bridge + skin) / 2.0,
+        skin=skin,
+        bridges=bridges,
+    )
+
+
+def _kernel_rows(case: Case, walls: Sequence[Wall]) -> list[KernelRow]:
+    """Walls as the kernels take them; `InputError` for facets."""
     rows = []
     for wall in walls:
         row = wall.kernel_row()
@@ -164,41 +202,75 @@ def _rows_of(case: Case, walls: Sequence[Wall]) -> list[KernelRow]:
     return rows
 
 
-def _constants(
-    case: Case, radius: FloatArray, walls: Sequence[Wall], without: Collection[str]
-) -> Constants:
-    contact = case.contact
-    modulus, ratio, loss = contact.youngs_modulus, contact.poissons_ratio, log(contact.restitution)
-    damping, friction, rolling, gravity, drive = (term not in without for term in TERMS[2:])
-    waves = [
+def _drive(case: Case) -> tuple[FloatArray, FloatArray]:
+    """The fields ``harmonics`` and ``inertial_acceleration`` of `Constants`."""
+    if case.drive.ramp or case.drive.record:
+        times = case.run.time_step * np.arange(case.run.steps + 1, dtype=np.float64)
+        acceleration = np.zeros((len(times), 3))
+        for direction, motion in case.excitation.motions(times):
+            _, _, wall_acceleration = motion
+            acceleration -= np.outer(wall_acceleration, direction)
+        return np.zeros((0, 6)), acceleration
+    harmonics = [
         (*wave.direction, wave.angular_frequency, wave.peak_acceleration, wave.phase)
         for wave in case.excitation.harmonics
     ]
-    course = np.zeros((0, 3))
-    if drive and (case.drive.ramp or case.drive.record):
-        waves, times = [], case.run.time_step * np.arange(case.run.steps + 1, dtype=np.float64)
-        course = np.zeros((len(times), 3))
-        for direction, moved in case.excitation.motions(times):
-            course -= np.outer(moved[2], direction)
-    bridges, skin = _bridges(case, radius, without), _SKIN * float(radius.min())
-    rows = _rows_of(case, walls)
-    return Constants(
-        step=case.run.time_step,
-        radius=radius,
-        mass=4.0 / 3.0 * pi * radius**3 * case.beads.density,
-        point=np.array([row.point for row in rows]).reshape(-1, 3),
-        normal=np.array([row.normal for row in rows]).reshape(-1, 3),
-        hollow=np.array([row.radius for row in rows]),
-        gravity=np.array(case.gravity_vector) * gravity,
-        harmonics=np.array(waves if drive else (), dtype=np.float64).reshape(-1, 6),
-        course=course,
-        modulus=modulus / (2.0 * (1.0 - ratio**2)),
-        shear_modulus=modulus / (4.0 * (1.0 + ratio) * (2.0 - ratio)),
-        damping=-loss / sqrt(loss**2 + pi**2) * damping,
-        friction_beads=contact.friction.bead_bead * friction,
-        friction_walls=contact.friction.bead_wall * friction,
-        rolling=contact.rolling_friction * rolling,
-        reach=radius + (bridges.spans[:, kernels.RUPTURE].max() + skin) / 2.0,
-        skin=skin,
-        bridges=bridges,
+    return np.array(harmonics, dtype=np.float64).reshape(-1, 6), np.zeros((0, 3))
+
+
+def _bridges(case: Case, radius: FloatArray, strengths: Mapping[str, float]) -> BridgeSplines:
+    """Bridges between all sizes of beads and between beads and walls."""
+    sizes, size_of_bead = np.unique(radius, return_inverse=True)
+    count = len(sizes)
+    other_radii = [*sizes.tolist(), inf]
+    first_bridge = np.empty((count, count + 1), dtype=np.int64)
+    contribution = np.zeros((count, count + 1, 2))
+    spans = []
+    splines = []
+    volumes = []
+    for row, small in enumerate(sizes.tolist()):
+        first_bridge[row, :row] = first_bridge[:row, row]
+        contribution[row, :row] = contribution[:row, row, ::-1]
+        for column in range(row, count + 1):
+            surfaces = surfaces_of(case, small, other_radii[column])
+            first_bridge[row, column] = len(volumes)
+            contribution[row, column] = surfaces.films[0]
+            for with_volume in surfaces.volumes:
+                span, coefficients = _spline(case.law, with_volume)
+                spans.append(span)
+                splines.append(coefficients)
+                volumes.append(with_volume.volume)
+    lubrication = strengths["lubrication"]
+    factors = np.array([strengths["capillary"], lubrication, lubrication, lubrication, lubrication])
+    return BridgeSplines(
+        spans=np.stack(spans),
+        splines=np.stack(splines) * factors,
+        size=size_of_bead.astype(np.int64),
+        first_bridge=first_bridge,
+        volume=np.array(volumes),
+        full_step=8 if case.liquid.conserved else 0,
+        contribution=contribution,
+        liquid=4.0 / 3.0 * pi * radius**3 * case.liquid.of_bridges.volume_fraction,
     )
+
+
+@lru_cache(maxsize=4096)
+def _spline(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
+    """Row of `BridgeSplines.spans` and of its splines for a bridge; a kink may be at the scale."""
+    curve = law(surfaces)
+    rupture = curve.rupture
+    scale = curve.scale if curve.scale else surfaces.roughness
+    if scale >= rupture:
+        scale = 0.4 * rupture
+    middle = max(0.5 * rupture, 0.5 * (scale + rupture))
+    t = np.linspace(0.0, 1.0, CELLS + 1)
+    knots_of_pieces = (
+        scale * t,
+        scale * (middle / scale) ** t,
+        rupture - (rupture - middle) * (1.0 - t) ** 2,
+    )
+    splines = []
+    for gaps in knots_of_pieces:
+        spline = CubicSpline(CELLS * t, curve.forces(gaps).columns())
+        splines.append(spline.c.transpose(1, 0, 2))
+    return np.array([curve.formation, scale, middle, rupture]), np.stack(splines)

@@ -1,18 +1,26 @@
-"""The second engine's formulas and its integration, compiled by numba.
+"""The formulas of the second engine and its integration, compiled by numba.
 
-Normals point from the second body (or the wall) to the first; h is the gap, δ = -h the overlap. Two surfaces meet by
-`meet`, whose terms are Hertz's repulsion with Tsuji's damping, Mindlin's spring with damping, both together no larger
-than μ times the elastic repulsion, rolling friction, and a bridge, whose pull and resistances are splines (`BridgeSplines`).
-Forces are those at the new places, of the velocities half a step before (velocity Verlet with the forces evaluated once
-a step: L. Verlet, Phys. Rev. 159 (1967) 98; in granular codes as in Plimpton, J. Comput. Phys. 117 (1995) 1, doi
-10.1006/jcph.1995.1039).
+Normals point from the second body (a bead or a wall) to the first; h is the gap, δ = -h the
+overlap. `pair_force` gives the forces of a pair: Hertz's repulsion with Tsuji's damping,
+Mindlin's spring with damping, both together no larger than μ times the elastic repulsion, rolling
+friction, and a bridge between the surfaces, whose capillary force and resistances are splines
+(`BridgeSplines`).
+
+The integration is velocity Verlet with the forces evaluated once a step, at the new positions and
+with the velocities half a step before, as granular codes do.
+
+The module knows no cases: `walkers.second_engine.engine` makes `Constants` and `State` of a case.
 
 References
 ----------
-H. Hertz, J. reine angew. Math. 92 (1881) 156; R. D. Mindlin, J. Appl. Mech. 16 (1949) 259; Y. Tsuji, T. Tanaka,
-T. Ishida, Powder Technology 71 (1992) 239, doi 10.1016/0032-5910(92)88030-L (damping).
-J. Ai, J.-F. Chen, J. M. Rotter, J. Y. Ooi, Powder Technology 206 (2011) 269, doi 10.1016/j.powtec.2010.09.030, model A
-(rolling friction).
+H. Hertz, J. reine angew. Math. 92 (1881) 156.
+R. D. Mindlin, J. Appl. Mech. 16 (1949) 259.
+Y. Tsuji, T. Tanaka, T. Ishida, Powder Technology 71 (1992) 239, doi 10.1016/0032-5910(92)88030-L
+(damping).
+J. Ai, J.-F. Chen, J. M. Rotter, J. Y. Ooi, Powder Technology 206 (2011) 269, doi
+10.1016/j.powtec.2010.09.030, model A (rolling friction).
+L. Verlet, Phys. Rev. 159 (1967) 98; S. Plimpton, J. Comput. Phys. 117 (1995) 1, doi
+10.1006/jcph.1995.1039 (integration).
 """
 
 from __future__ import annotations
@@ -21,79 +29,148 @@ from math import log, log2, sin, sqrt
 from typing import NamedTuple
 
 import numba
-import numpy as np
-import numpy.typing as npt
 
-from walkers.arrays import FloatArray, IntArray, Vector
+from walkers.arrays import BoolArray, FloatArray, IntArray, Vector
 
 compiled = numba.njit(cache=True, error_model="numpy")
 
 CELLS = 512
-"""Cells of each of the three pieces of a bridge's splines."""
-FORMATION, SCALE, MIDDLE, RUPTURE = range(4)
-NONE: Vector = (0.0, 0.0, 0.0)
+"""Number of cells of each of the three pieces of a bridge's splines."""
+FORMATION = 0
+"""Column of `BridgeSplines.spans`: gap at which the bridge forms."""
+SCALE = 1
+"""Column of `BridgeSplines.spans`: gap at which the first piece ends."""
+MIDDLE = 2
+"""Column of `BridgeSplines.spans`: gap at which the second piece ends."""
+RUPTURE = 3
+"""Column of `BridgeSplines.spans`: gap at which the bridge breaks."""
+ZERO: Vector = (0.0, 0.0, 0.0)
+"""The vector of length zero."""
 
 
 class BridgeSplines(NamedTuple):
-    """T bridges as splines in h up to the scale, in ln h up to the middle, and in √(rupture - h) up to the rupture.
+    """Capillary force and resistances of T bridges between beads of K sizes and walls.
 
-    ``spans`` (T, 4): gaps at which a bridge forms, pieces end, and it breaks, m; ``splines`` (T, 3, CELLS, 4, 5):
-    coefficients of each cell, highest power first, of pull (N) and resistances; ``kind`` (N,): index of each bead's
-    radius; ``between`` (K, K + 1): index of the bridge between two kinds, and in the last column to walls.
+    Each bridge has three pieces: cubic splines in h up to the gap `SCALE`, in ln h up to
+    `MIDDLE`, and in √(rupture - h) up to `RUPTURE`. Where liquid is conserved, two surfaces have
+    one bridge for each of several volumes, in steps of √2; otherwise one.
 
-    ``volume`` (T,), m³. Where liquid is conserved, two kinds have bridges of several volumes, in steps of √2 from the
-    index on; full films give the volume after a number of ``steps``, else 0. ``full`` (K, K + 1, 2): contributions of
-    full films of the first and second kind to their bridge, m³; ``liquid`` (N,): the liquid of each bead, m³.
+    Attributes
+    ----------
+    spans : ndarray, shape (T, 4)
+        Gaps at which a bridge forms, its pieces end, and it breaks, m.
+    splines : ndarray, shape (T, 3, CELLS, 4, 5)
+        Coefficients of each cell, highest power first, of the capillary force (N) and the normal
+        (N s/m), sliding (N s/m), coupling (N s) and rolling (N m s) resistances.
+    size : ndarray of int, shape (N,)
+        Index of the size of each bead.
+    first_bridge : ndarray of int, shape (K, K + 1)
+        Index of the bridge of the smallest volume between beads of two sizes; in the last column,
+        between a bead and a wall.
+    volume : ndarray, shape (T,)
+        Volume of each bridge, m³.
+    full_step : int
+        Number of steps from the smallest volume to that of a bridge of full films; 0 if liquid is
+        not conserved.
+    contribution : ndarray, shape (K, K + 1, 2)
+        Volumes that full films of the first and the second body contribute to their bridge, m³.
+    liquid : ndarray, shape (N,)
+        Liquid of each bead, m³.
     """
 
     spans: FloatArray
     splines: FloatArray
-    kind: IntArray
-    between: IntArray
+    size: IntArray
+    first_bridge: IntArray
     volume: FloatArray
-    steps: int
-    full: FloatArray
+    full_step: int
+    contribution: FloatArray
     liquid: FloatArray
 
 
 class Constants(NamedTuple):
-    """Constants: N beads, W walls (``hollow``: radii of cylinders, 0 for planes), H harmonics; SI units.
+    """What does not change: N beads, W walls and H harmonics of the drive, SI units.
 
-    Beads are near each other if they are closer than the sum of their ``reach`` (N,), which includes the ``skin``.
-
-    ``harmonics`` (H, 6) are directions, ω, accelerations and phases; ``course`` has the inertial acceleration at each
-    step of a drive with a ramp or from a record, else no rows; moduli are E* and G*, ``damping`` is β. Rolling
-    friction is the same for beads and walls.
+    Attributes
+    ----------
+    step : float
+        Time step, s.
+    radius, mass : ndarray, shape (N,)
+        Radius (m) and mass (kg) of each bead.
+    wall_point : ndarray, shape (W, 3)
+        A point of each plane, or of the axis of each cylinder, m.
+    wall_normal : ndarray, shape (W, 3)
+        Unit normal of each plane, toward the beads.
+    cylinder_radius : ndarray, shape (W,)
+        Inner radius of each upright cylinder, m; 0 for planes.
+    gravity : ndarray, shape (3,)
+        Gravity, m/s².
+    harmonics : ndarray, shape (H, 6)
+        Direction (3 columns), angular frequency (rad/s), peak acceleration (m/s²) and phase (rad).
+    inertial_acceleration : ndarray, shape (steps, 3)
+        Inertial acceleration at each step, m/s², of a drive with a ramp or from a record, which
+        then has no harmonics; otherwise no rows.
+    modulus, shear_modulus : float
+        Reduced moduli E* and G* of two equal materials, Pa.
+    damping : float
+        Coefficient β of Tsuji's damping.
+    friction_beads, friction_walls : float
+        Friction coefficient μ between two beads, and between a bead and a wall.
+    rolling : float
+        Coefficient of rolling friction, the same for beads and walls.
+    search_radius : ndarray, shape (N,)
+        Beads are neighbours if their distance is less than the sum of these radii, m. They include
+        the skin.
+    skin : float
+        Distance that neighbours may have beyond the rupture of their bridge, m.
+    bridges : BridgeSplines
+        Bridges between all sizes of beads and between beads and walls.
     """
 
     step: float
     radius: FloatArray
     mass: FloatArray
-    point: FloatArray
-    normal: FloatArray
-    hollow: FloatArray
+    wall_point: FloatArray
+    wall_normal: FloatArray
+    cylinder_radius: FloatArray
     gravity: FloatArray
     harmonics: FloatArray
-    course: FloatArray
+    inertial_acceleration: FloatArray
     modulus: float
     shear_modulus: float
     damping: float
     friction_beads: float
     friction_walls: float
     rolling: float
-    reach: FloatArray
+    search_radius: FloatArray
     skin: float
     bridges: BridgeSplines
 
 
 class State(NamedTuple):
-    """State of N beads, arrays of shape (N, 3), and of their contacts with each other and W walls.
+    """State of N beads and of their contacts with each other and with W walls, SI units.
 
-    ``film`` (N,): liquid on a bead, not in bridges, over its whole liquid; ``offered`` (N,): the same at the end of the
-    step before: bridges between beads form from it. A contact has a bead and a bead of a higher number, or a wall
-    (numbered after the beads): ``spring`` (N, N + W, 3) has tangential displacements, m, ``bridge`` (N, N + W) the
-    index of the bridge, or -1. ``near`` (N, N) are the beads that may meet before a bead has moved by nearly half the
-    ``skin`` from its place ``listed`` (N, 3).
+    A contact has a bead and a bead with a higher number, or a bead and a wall; walls are numbered
+    after the beads.
+
+    Attributes
+    ----------
+    position, velocity, spin : ndarray, shape (N, 3)
+        Position (m), velocity (m/s) and angular velocity (rad/s) of each bead.
+    force, torque : ndarray, shape (N, 3)
+        Force (N) and torque (N m) on each bead.
+    film : ndarray, shape (N,)
+        Liquid on each bead that is not in bridges, over all its liquid.
+    previous_film : ndarray, shape (N,)
+        The same at the end of the previous step, from which bridges between beads form.
+    spring : ndarray, shape (N, N + W, 3)
+        Tangential displacement of each contact, m.
+    bridge : ndarray of int, shape (N, N + W)
+        Index of the bridge of each contact, or -1.
+    neighbours : ndarray of bool, shape (N, N)
+        Whether two beads may meet before a bead has moved by nearly half the skin.
+    listed_position : ndarray, shape (N, 3)
+        Positions where the neighbours were listed, m.
     """
 
     position: FloatArray
@@ -102,36 +179,53 @@ class State(NamedTuple):
     force: FloatArray
     torque: FloatArray
     film: FloatArray
-    offered: FloatArray
+    previous_film: FloatArray
     spring: FloatArray
     bridge: IntArray
-    near: npt.NDArray[np.bool_]
-    listed: FloatArray
+    neighbours: BoolArray
+    listed_position: FloatArray
 
 
-class Meeting(NamedTuple):
-    """State of a pair: index of the bridge or -1, gap, reduced radius and mass, friction, normal, and velocities.
+class Contact(NamedTuple):
+    """A pair of surfaces that touch or have a bridge, SI units.
 
-    ``order`` is -1 if the first bead is the larger one, which changes the sign of the coupling; ``apart`` is the normal
-    velocity of the centres, ``slide`` the sliding velocity of the surfaces (m/s), ``turn`` the difference of the spins
-    (rad/s).
+    Attributes
+    ----------
+    bridge : int
+        Index of the bridge, or -1.
+    coupling_sign : float
+        -1 if the first bead is the larger one, which changes the sign of the coupling; otherwise 1.
+    gap : float
+        Gap, negative for an overlap, m.
+    radius, mass : float
+        Reduced radius (m) and mass (kg).
+    friction : float
+        Friction coefficient μ.
+    normal : Vector
+        Unit normal from the second body to the first.
+    normal_velocity : float
+        Velocity at which the centres move apart, m/s.
+    sliding_velocity : Vector
+        Tangential velocity of the first surface relative to the second, m/s.
+    relative_spin : Vector
+        Difference of the angular velocities, rad/s.
     """
 
     bridge: int
-    order: float
+    coupling_sign: float
     gap: float
     radius: float
     mass: float
     friction: float
-    n: Vector
-    apart: float
-    slide: Vector
-    turn: Vector
+    normal: Vector
+    normal_velocity: float
+    sliding_velocity: Vector
+    relative_spin: Vector
 
 
 @compiled
 def vector(values: FloatArray) -> Vector:
-    """A row as a tuple."""
+    """A row of an array as a tuple."""
     return (values[0], values[1], values[2])
 
 
@@ -148,248 +242,436 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 @compiled
-def plus(a: Vector, scale: float, b: Vector) -> Vector:
-    """The first, and the second times a number."""
+def add_scaled(a: Vector, scale: float, b: Vector) -> Vector:
+    """The sum a + scale b."""
     return (a[0] + scale * b[0], a[1] + scale * b[1], a[2] + scale * b[2])
 
 
 @compiled
 def bridge_forces(
-    b: BridgeSplines, bridge: int, gap: float
+    bridges: BridgeSplines, bridge: int, gap: float
 ) -> tuple[float, float, float, float, float]:
-    """Pull (N) and resistances: normal, sliding (N s/m), coupling (N s), rolling (N m s)."""
-    scale, middle, rupture = (
-        b.spans[bridge, SCALE],
-        b.spans[bridge, MIDDLE],
-        b.spans[bridge, RUPTURE],
-    )
+    """Capillary force and resistances of a bridge at a gap (m); those of overlaps are as at
+    contact.
+
+    Returns
+    -------
+    pull, normal, sliding, coupling, rolling : float
+        Capillary force (N) and resistances (N s/m, N s/m, N s, N m s).
+    """
+    scale = bridges.spans[bridge, SCALE]
+    middle = bridges.spans[bridge, MIDDLE]
+    rupture = bridges.spans[bridge, RUPTURE]
     gap = max(gap, 0.0)
     if gap < scale:
-        piece, place = 0, gap / scale
+        piece = 0
+        share = gap / scale
     elif gap < middle:
-        piece, place = 1, log(gap / scale) / log(middle / scale)
+        piece = 1
+        share = log(gap / scale) / log(middle / scale)
     else:
-        piece, place = 2, 1.0 - sqrt((rupture - gap) / (rupture - middle))
-    cell = min(int(place * CELLS), CELLS - 1)
-    t = place * CELLS - cell
-    f = b.splines[bridge, piece, cell]
-    values = ((f[0] * t + f[1]) * t + f[2]) * t + f[3]
+        piece = 2
+        share = 1.0 - sqrt((rupture - gap) / (rupture - middle))
+    cell = min(int(share * CELLS), CELLS - 1)
+    t = share * CELLS - cell
+    coefficients = bridges.splines[bridge, piece, cell]
+    values = ((coefficients[0] * t + coefficients[1]) * t + coefficients[2]) * t + coefficients[3]
     return values[0], values[1], values[2], values[3], values[4]
 
 
 @compiled
-def touch(
-    c: Constants, m: Meeting, spring: FloatArray, moves: bool
+def contact_force(
+    constants: Constants, contact: Contact, spring: FloatArray, advances: bool
 ) -> tuple[float, Vector, Vector]:
-    """Normal force (N), tangential force (N) and couple (N m) on the first of two surfaces that overlap.
+    """Forces between two surfaces that overlap, without their bridge.
 
-    The ``spring`` (m) changes if time advances (``moves``); otherwise it keeps its length.
+    Parameters
+    ----------
+    constants, contact
+        The constants and the pair.
+    spring : ndarray, shape (3,)
+        Tangential displacement, m. It is changed if time advances.
+    advances
+        Whether the displacement grows by that of a time step. Otherwise it keeps its length.
+
+    Returns
+    -------
+    normal : float
+        Repulsion, N.
+    tangential, couple : Vector
+        Tangential force (N) and couple (N m) on the first body.
     """
-    root = sqrt(-m.radius * m.gap)
-    elastic = -4.0 / 3.0 * c.modulus * root * m.gap
-    damping = 2.0 * sqrt(5.0 / 6.0) * c.damping * sqrt(m.mass)
-    stretch = vector(spring)
-    if moves:
-        stretch = plus(stretch, c.step, m.slide)
-        stretch = plus(stretch, -dot(stretch, m.n), m.n)
-    stiffness, limit = 8.0 * c.shear_modulus * root, m.friction * elastic
-    held = stiffness * sqrt(dot(stretch, stretch))
-    scale, along = 1.0, NONE
-    if held > limit:
-        scale = limit / held
+    root = sqrt(-contact.radius * contact.gap)
+    elastic = -4.0 / 3.0 * constants.modulus * root * contact.gap
+    damping = 2.0 * sqrt(5.0 / 6.0) * constants.damping * sqrt(contact.mass)
+    displacement = vector(spring)
+    if advances:
+        displacement = add_scaled(displacement, constants.step, contact.sliding_velocity)
+        normal_part = dot(displacement, contact.normal)
+        displacement = add_scaled(displacement, -normal_part, contact.normal)
+    stiffness = 8.0 * constants.shear_modulus * root
+    limit = contact.friction * elastic
+    spring_force = stiffness * sqrt(dot(displacement, displacement))
+    scale = 1.0
+    tangential_damping = ZERO
+    if spring_force > limit:
+        scale = limit / spring_force
     else:
-        along = plus(NONE, -damping * sqrt(stiffness), m.slide)
-    tangential = plus(along, -scale * stiffness, stretch)
+        tangential_damping = add_scaled(ZERO, -damping * sqrt(stiffness), contact.sliding_velocity)
+    tangential = add_scaled(tangential_damping, -scale * stiffness, displacement)
     size = sqrt(dot(tangential, tangential))
     if size > limit:
-        tangential = plus(NONE, limit / size, tangential)
-    if moves:
+        tangential = add_scaled(ZERO, limit / size, tangential)
+    if advances:
         for axis in range(3):
-            spring[axis] = scale * stretch[axis]
-    turning, couple = sqrt(dot(m.turn, m.turn)), NONE
-    if turning > 0.0:
-        rolls = plus(m.turn, -dot(m.turn, m.n), m.n)
-        couple = plus(NONE, -c.rolling * elastic * m.radius / turning, rolls)
-    return elastic - damping * sqrt(2.0 * c.modulus * root) * m.apart, tangential, couple
+            spring[axis] = scale * displacement[axis]
+    couple = ZERO
+    spin_rate = sqrt(dot(contact.relative_spin, contact.relative_spin))
+    if spin_rate > 0.0:
+        normal_part = dot(contact.relative_spin, contact.normal)
+        rolling_spin = add_scaled(contact.relative_spin, -normal_part, contact.normal)
+        torque = constants.rolling * elastic * contact.radius
+        couple = add_scaled(ZERO, -torque / spin_rate, rolling_spin)
+    normal_damping = damping * sqrt(2.0 * constants.modulus * root)
+    return elastic - normal_damping * contact.normal_velocity, tangential, couple
 
 
 @compiled
-def meet(c: Constants, m: Meeting, spring: FloatArray, moves: bool) -> tuple[Vector, Vector]:
-    """Force (N) and couple (N m) on the first of two surfaces that touch or have a bridge."""
-    normal, tangential, couple = touch(c, m, spring, moves) if m.gap < 0.0 else (0.0, NONE, NONE)
-    if m.bridge >= 0:
-        pull, resists, slides, couples, rolls = bridge_forces(c.bridges, m.bridge, m.gap)
-        q, couples = cross(m.n, m.turn), m.order * couples
-        normal -= pull + resists * m.apart
-        tangential = plus(plus(tangential, -slides, m.slide), -couples, q)
-        couple = plus(plus(couple, couples, cross(m.n, m.slide)), rolls, cross(m.n, q))
-    return plus(tangential, normal, m.n), couple
+def pair_force(
+    constants: Constants, contact: Contact, spring: FloatArray, advances: bool
+) -> tuple[Vector, Vector]:
+    """Forces between two surfaces that touch or have a bridge; parameters as for `contact_force`.
+
+    The equations of the bridge are those of `walkers.physics.bridge`.
+
+    Returns
+    -------
+    force, couple : Vector
+        Force (N) and couple (N m) on the first body.
+    """
+    normal = 0.0
+    tangential = ZERO
+    couple = ZERO
+    if contact.gap < 0.0:
+        normal, tangential, couple = contact_force(constants, contact, spring, advances)
+    if contact.bridge >= 0:
+        pull, normal_resistance, sliding, coupling, rolling = bridge_forces(
+            constants.bridges, contact.bridge, contact.gap
+        )
+        coupling = contact.coupling_sign * coupling
+        q = cross(contact.normal, contact.relative_spin)
+        normal -= pull + normal_resistance * contact.normal_velocity
+        tangential = add_scaled(tangential, -sliding, contact.sliding_velocity)
+        tangential = add_scaled(tangential, -coupling, q)
+        turned_sliding = cross(contact.normal, contact.sliding_velocity)
+        couple = add_scaled(couple, coupling, turned_sliding)
+        couple = add_scaled(couple, rolling, cross(contact.normal, q))
+    return add_scaled(tangential, normal, contact.normal), couple
 
 
 @compiled
-def push(
-    state: State, bead: int, sign: float, arm: float, n: Vector, acting: tuple[Vector, Vector]
+def add_force(  # noqa: PLR0913, PLR0917 (a kernel, whose arguments are numbers and arrays)
+    state: State,
+    bead: int,
+    sign: float,
+    arm: float,
+    normal: Vector,
+    force_and_couple: tuple[Vector, Vector],
 ) -> None:
-    """A force (N) and a couple (N m), or their reaction (``sign`` -1), on a bead, ``arm`` (m) from the contact."""
-    force, couple = acting
-    turn = cross(n, force)
+    """Add a force (N) and a couple (N m) to those on a bead.
+
+    ``sign`` is -1 for the reaction on the second body, otherwise 1; ``arm`` is the distance of the
+    centre from the middle of the contact, m.
+    """
+    force, couple = force_and_couple
+    moment = cross(normal, force)
     for axis in range(3):
         state.force[bead, axis] += sign * force[axis]
-        state.torque[bead, axis] += sign * couple[axis] - arm * turn[axis]
+        state.torque[bead, axis] += sign * couple[axis] - arm * moment[axis]
 
 
 @compiled
-def separation(c: Constants, state: State, i: int, j: int) -> tuple[Vector, float]:
-    """Normal from the second body, a bead or a wall, to the first, and the gap (m)."""
-    place, wall = vector(state.position[i]), j - c.radius.shape[0]
-    if wall < 0:
-        away = plus(place, -1.0, vector(state.position[j]))
-        distance = sqrt(dot(away, away))
-        return (away[0] / distance, away[1] / distance, away[2] / distance), distance - (
-            c.radius[i] + c.radius[j]
-        )
-    away, n = plus(place, -1.0, vector(c.point[wall])), vector(c.normal[wall])
-    if c.hollow[wall] == 0.0:
-        return n, dot(away, n) - c.radius[i]
-    out = sqrt(away[0] ** 2 + away[1] ** 2)
-    return (-away[0] / out, -away[1] / out, 0.0), c.hollow[wall] - out - c.radius[i]
+def separation(constants: Constants, state: State, i: int, j: int) -> tuple[Vector, float]:
+    """Normal and gap of a bead i and a body j, which is a wall if j is no number of a bead.
 
-
-@compiled
-def bridge_of(b: BridgeSplines, state: State, i: int, j: int, held: int, gap: float) -> int:
-    """Index of the bridge of a pair, or -1; a bridge that forms takes its volume from films, and later returns it.
-
-    It takes liquid in proportion to the films' offers, and returns it in proportion to the contributions of full films.
-    Bridges to walls form after bridges between beads, from the rest of the films.
+    Returns
+    -------
+    normal : Vector
+        Unit vector from the second body to the first.
+    gap : float
+        Gap in m, negative for an overlap.
     """
-    beads = b.kind.shape[0]
-    wall = j >= beads
-    kinds = b.kind[i], -1 if wall else b.kind[j]
-    if held < 0:
-        held = b.between[kinds]
-        first, second = b.full[kinds]
-        offers = (
-            (first * state.film[i], 0.0)
-            if wall
-            else (first * state.offered[i], second * state.offered[j])
+    position = vector(state.position[i])
+    radius = constants.radius[i]
+    wall = j - constants.radius.shape[0]
+    if wall < 0:
+        arm = add_scaled(position, -1.0, vector(state.position[j]))
+        distance = sqrt(dot(arm, arm))
+        normal = (arm[0] / distance, arm[1] / distance, arm[2] / distance)
+        return normal, distance - (radius + constants.radius[j])
+    arm = add_scaled(position, -1.0, vector(constants.wall_point[wall]))
+    if constants.cylinder_radius[wall] == 0.0:
+        normal = vector(constants.wall_normal[wall])
+        return normal, dot(arm, normal) - radius
+    axis_distance = sqrt(arm[0] ** 2 + arm[1] ** 2)
+    normal = (-arm[0] / axis_distance, -arm[1] / axis_distance, 0.0)
+    return normal, constants.cylinder_radius[wall] - axis_distance - radius
+
+
+@compiled
+def updated_bridge(bridges: BridgeSplines, state: State, i: int, j: int, gap: float) -> int:
+    """Index of the bridge of a pair at a gap (m), or -1; bridges form and break here.
+
+    Where liquid is conserved, the films change: a bridge that forms takes its volume from them,
+    and a bridge that breaks returns it in proportion to the contributions of full films.
+    """
+    bridge = state.bridge[i, j]
+    if bridge < 0:
+        return new_bridge(bridges, state, i, j, gap)
+    if gap < bridges.spans[bridge, RUPTURE]:
+        return bridge
+    if bridges.full_step:
+        size_i = bridges.size[i]
+        size_j = -1 if j >= bridges.size.shape[0] else bridges.size[j]
+        contributions = bridges.contribution[size_i, size_j]
+        add_to_films(
+            bridges, state, i, j, bridges.volume[bridge], (contributions[0], contributions[1])
         )
-        if b.steps:
-            part = (offers[0] + offers[1]) / (first + second)
-            level = round(2.0 * log2(part)) if part > 0.0 else -b.steps - 1
-            if level < -b.steps and 1.2 * part < 2.0 ** (-0.5 * b.steps):
-                return -1
-            held += b.steps + min(max(level, -b.steps), 1)
-        if gap > b.spans[held, FORMATION] or gap >= b.spans[held, RUPTURE]:
-            return -1
-        sign = -1.0
-    elif gap < b.spans[held, RUPTURE]:
-        return held
+    return -1
+
+
+@compiled
+def new_bridge(bridges: BridgeSplines, state: State, i: int, j: int, gap: float) -> int:
+    """Index of the bridge that forms between two bodies at a gap (m), or -1.
+
+    A bridge takes liquid in proportion to what the films offer. Bridges to walls form after bridges
+    between beads, from the rest of the films.
+    """
+    size_i = bridges.size[i]
+    if j >= bridges.size.shape[0]:
+        size_j = -1
+        first_full, second_full = bridges.contribution[size_i, size_j]
+        first_offer = first_full * state.film[i]
+        second_offer = 0.0
     else:
-        offers, sign = (b.full[kinds][0], b.full[kinds][1]), 1.0
-    if b.steps:
-        part = sign * b.volume[held] / (offers[0] + offers[1])
-        state.film[i] += part * offers[0] / b.liquid[i]
-        if not wall:
-            state.film[j] += part * offers[1] / b.liquid[j]
-    return held if sign < 0.0 else -1
+        size_j = bridges.size[j]
+        first_full, second_full = bridges.contribution[size_i, size_j]
+        first_offer = first_full * state.previous_film[i]
+        second_offer = second_full * state.previous_film[j]
+    bridge = bridges.first_bridge[size_i, size_j]
+    if bridges.full_step:
+        step = volume_step(bridges, (first_offer + second_offer) / (first_full + second_full))
+        if step < 0:
+            return -1
+        bridge += step
+    if gap > bridges.spans[bridge, FORMATION] or gap >= bridges.spans[bridge, RUPTURE]:
+        return -1
+    if bridges.full_step:
+        offers = (first_offer, second_offer)
+        add_to_films(bridges, state, i, j, -bridges.volume[bridge], offers)
+    return bridge
 
 
 @compiled
-def look_around(c: Constants, state: State) -> None:
+def volume_step(bridges: BridgeSplines, share: float) -> int:
+    """Number of steps of √2 from the smallest volume to that of a bridge of films.
+
+    Parameters
+    ----------
+    bridges
+        The bridges, where liquid is conserved.
+    share
+        What the films offer, over what full films contribute.
+
+    Returns
+    -------
+    int
+        The step of the nearest volume, or -1 if the offer is too small for the smallest one.
+    """
+    least = -bridges.full_step
+    level = least - 1
+    if share > 0.0:
+        level = round(2.0 * log2(share))
+    if level < least and 1.2 * share < 2.0 ** (-0.5 * bridges.full_step):
+        return -1
+    return bridges.full_step + min(max(level, least), 1)
+
+
+@compiled
+def add_to_films(  # noqa: PLR0913, PLR0917 (a kernel, whose arguments are numbers and arrays)
+    bridges: BridgeSplines,
+    state: State,
+    i: int,
+    j: int,
+    volume: float,
+    weights: tuple[float, float],
+) -> None:
+    """Distribute a volume (m³), negative to take it away, over the films of a pair by weights."""
+    part = volume / (weights[0] + weights[1])
+    state.film[i] += part * weights[0] / bridges.liquid[i]
+    if j < bridges.size.shape[0]:
+        state.film[j] += part * weights[1] / bridges.liquid[j]
+
+
+@compiled
+def list_neighbours(constants: Constants, state: State) -> None:
     """List the beads that are near each other."""
-    state.listed[:] = state.position
-    for i in range(c.radius.shape[0]):
-        for j in range(i + 1, c.radius.shape[0]):
-            away = plus(vector(state.position[i]), -1.0, vector(state.position[j]))
-            state.near[i, j] = sqrt(dot(away, away)) < c.reach[i] + c.reach[j]
+    state.listed_position[:] = state.position
+    beads = constants.radius.shape[0]
+    for i in range(beads):
+        for j in range(i + 1, beads):
+            arm = add_scaled(vector(state.position[i]), -1.0, vector(state.position[j]))
+            limit = constants.search_radius[i] + constants.search_radius[j]
+            state.neighbours[i, j] = sqrt(dot(arm, arm)) < limit
 
 
 @compiled
-def forces(c: Constants, state: State, clock: int, moves: bool) -> None:
-    """All forces and torques at the places and velocities of the state: weight, inertia, contacts and bridges."""
-    beads, total = c.radius.shape[0], vector(c.gravity)
-    if clock >= 0:
-        for number in range(c.harmonics.shape[0]):
-            wave = c.harmonics[number]
-            total = plus(
-                total,
-                wave[4] * sin(wave[3] * clock * c.step + wave[5]),
-                (wave[0], wave[1], wave[2]),
-            )
-        if c.course.shape[0]:
-            total = plus(total, 1.0, vector(c.course[clock]))
+def body_acceleration(constants: Constants, clock: int) -> Vector:
+    """Gravity and inertial acceleration of the frame of the walls at a step, m/s²."""
+    acceleration = vector(constants.gravity)
+    if clock < 0:
+        return acceleration
+    for number in range(constants.harmonics.shape[0]):
+        harmonic = constants.harmonics[number]
+        direction = (harmonic[0], harmonic[1], harmonic[2])
+        phase = harmonic[3] * clock * constants.step + harmonic[5]
+        acceleration = add_scaled(acceleration, harmonic[4] * sin(phase), direction)
+    if constants.inertial_acceleration.shape[0]:
+        recorded = vector(constants.inertial_acceleration[clock])
+        acceleration = add_scaled(acceleration, 1.0, recorded)
+    return acceleration
+
+
+@compiled
+def contact_of(  # noqa: PLR0913, PLR0917 (a kernel, whose arguments are numbers and arrays)
+    constants: Constants, state: State, i: int, j: int, normal: Vector, gap: float
+) -> Contact:
+    """The contact of a bead i with a bead or wall j, from their normal, gap (m) and velocities."""
+    bridge = state.bridge[i, j]
+    arm = constants.radius[i] + 0.5 * gap
+    spin = vector(state.spin[i])
+    velocity = vector(state.velocity[i])
+    turning = add_scaled(ZERO, arm, spin)
+    relative_spin = spin
+    radius = constants.radius[i]
+    mass = constants.mass[i]
+    friction = constants.friction_walls
+    coupling_sign = 1.0
+    if j < constants.radius.shape[0]:
+        other_radius = constants.radius[j]
+        other_mass = constants.mass[j]
+        other_spin = vector(state.spin[j])
+        velocity = add_scaled(velocity, -1.0, vector(state.velocity[j]))
+        turning = add_scaled(turning, other_radius + 0.5 * gap, other_spin)
+        relative_spin = add_scaled(spin, -1.0, other_spin)
+        if radius > other_radius:
+            coupling_sign = -1.0
+        radius = radius * other_radius / (radius + other_radius)
+        mass = mass * other_mass / (mass + other_mass)
+        friction = constants.friction_beads
+    normal_velocity = dot(velocity, normal)
+    tangential_velocity = add_scaled(velocity, -normal_velocity, normal)
+    sliding_velocity = add_scaled(tangential_velocity, 1.0, cross(normal, turning))
+    return Contact(
+        bridge,
+        coupling_sign,
+        gap,
+        radius,
+        mass,
+        friction,
+        normal,
+        normal_velocity,
+        sliding_velocity,
+        relative_spin,
+    )
+
+
+@compiled
+def update_forces(constants: Constants, state: State, clock: int, advances: bool) -> None:
+    """Compute all forces and torques at the positions and velocities of the state.
+
+    They are those of weight, inertia, contacts and bridges. Bridges form and break; springs grow by
+    the displacement of a time step if time ``advances``. ``clock`` is the number of the step.
+    """
+    beads = constants.radius.shape[0]
+    acceleration = body_acceleration(constants, clock)
     for bead in range(beads):
         for axis in range(3):
-            state.force[bead, axis] = c.mass[bead] * total[axis]
+            state.force[bead, axis] = constants.mass[bead] * acceleration[axis]
             state.torque[bead, axis] = 0.0
     for i in range(beads):
-        for j in range(i + 1, beads + c.point.shape[0]):
-            if j < beads and not state.near[i, j]:
+        for j in range(i + 1, beads + constants.wall_point.shape[0]):
+            if j < beads and not state.neighbours[i, j]:
                 continue
-            n, gap = separation(c, state, i, j)
-            bridge = state.bridge[i, j] = bridge_of(c.bridges, state, i, j, state.bridge[i, j], gap)
+            normal, gap = separation(constants, state, i, j)
+            bridge = updated_bridge(constants.bridges, state, i, j, gap)
+            state.bridge[i, j] = bridge
             if gap >= 0.0:
                 state.spring[i, j, :] = 0.0
                 if bridge < 0:
                     continue
-            arm, spin = c.radius[i] + 0.5 * gap, vector(state.spin[i])
-            between, turn, turning = vector(state.velocity[i]), spin, plus(NONE, arm, spin)
-            radius, mass, friction, order, other_arm = (
-                c.radius[i],
-                c.mass[i],
-                c.friction_walls,
-                1.0,
-                0.0,
-            )
+            contact = contact_of(constants, state, i, j, normal, gap)
+            acting = pair_force(constants, contact, state.spring[i, j], advances)
+            add_force(state, i, 1.0, constants.radius[i] + 0.5 * gap, normal, acting)
             if j < beads:
-                other_arm, other_spin = c.radius[j] + 0.5 * gap, vector(state.spin[j])
-                between = plus(between, -1.0, vector(state.velocity[j]))
-                turn, turning = plus(spin, -1.0, other_spin), plus(turning, other_arm, other_spin)
-                radius = c.radius[i] * c.radius[j] / (c.radius[i] + c.radius[j])
-                mass = c.mass[i] * c.mass[j] / (c.mass[i] + c.mass[j])
-                friction, order = c.friction_beads, -1.0 if c.radius[i] > c.radius[j] else 1.0
-            apart = dot(between, n)
-            slide = plus(plus(between, -apart, n), 1.0, cross(n, turning))
-            m = Meeting(bridge, order, gap, radius, mass, friction, n, apart, slide, turn)
-            acting = meet(c, m, state.spring[i, j], moves)
-            push(state, i, 1.0, arm, n, acting)
-            if j < beads:
-                push(state, j, -1.0, other_arm, n, acting)
-    state.offered[:] = state.film
+                add_force(state, j, -1.0, constants.radius[j] + 0.5 * gap, normal, acting)
+    state.previous_film[:] = state.film
 
 
 @compiled
-def kick(c: Constants, state: State) -> None:
-    """Advance the velocities by half a step."""
-    half = 0.5 * c.step
-    for bead in range(c.radius.shape[0]):
-        speed = half / c.mass[bead]
-        spin = speed / (0.4 * c.radius[bead] ** 2)
+def kick(constants: Constants, state: State) -> None:
+    """Advance velocities and spins by half a step."""
+    half_step = 0.5 * constants.step
+    for bead in range(constants.radius.shape[0]):
+        step_over_mass = half_step / constants.mass[bead]
+        step_over_inertia = step_over_mass / (0.4 * constants.radius[bead] ** 2)
         for axis in range(3):
-            state.velocity[bead, axis] += speed * state.force[bead, axis]
-            state.spin[bead, axis] += spin * state.torque[bead, axis]
+            state.velocity[bead, axis] += step_over_mass * state.force[bead, axis]
+            state.spin[bead, axis] += step_over_inertia * state.torque[bead, axis]
 
 
 @compiled
-def advance(c: Constants, state: State, clock: int, every: int, frames: FloatArray) -> None:
-    """Integrate from a step on, ``every`` steps for each of the frames, of shape (F, N, 9)."""
-    far = (0.4 * c.skin) ** 2
-    look_around(c, state)
-    for number in range(frames.shape[0] * every):
-        kick(c, state)
-        farthest = 0.0
-        for bead in range(c.radius.shape[0]):
-            moved = 0.0
-            for axis in range(3):
-                state.position[bead, axis] += c.step * state.velocity[bead, axis]
-                moved += (state.position[bead, axis] - state.listed[bead, axis]) ** 2
-            farthest = max(farthest, moved)
-        forces(c, state, clock + number + 1, True)
-        kick(c, state)
-        if (number + 1) % every == 0:
-            frame = frames[(number + 1) // every - 1]
+def drift(constants: Constants, state: State) -> float:
+    """Advance positions by a step; return the largest squared move since the listing, m²."""
+    largest = 0.0
+    for bead in range(constants.radius.shape[0]):
+        squared_distance = 0.0
+        for axis in range(3):
+            state.position[bead, axis] += constants.step * state.velocity[bead, axis]
+            difference = state.position[bead, axis] - state.listed_position[bead, axis]
+            squared_distance += difference**2
+        largest = max(largest, squared_distance)
+    return largest
+
+
+@compiled
+def advance(
+    constants: Constants, state: State, clock: int, steps_per_frame: int, frames: FloatArray
+) -> None:
+    """Integrate, and write frames.
+
+    Parameters
+    ----------
+    constants, state
+        The constants, and the state, which changes.
+    clock
+        Number of the step of the state.
+    steps_per_frame
+        Number of steps between frames.
+    frames : ndarray, shape (F, N, 9)
+        Gets position (m), velocity (m/s) and spin (rad/s) of the beads.
+    """
+    relist_limit = (0.4 * constants.skin) ** 2
+    list_neighbours(constants, state)
+    for number in range(frames.shape[0] * steps_per_frame):
+        kick(constants, state)
+        largest_move = drift(constants, state)
+        update_forces(constants, state, clock + number + 1, True)
+        kick(constants, state)
+        if (number + 1) % steps_per_frame == 0:
+            frame = frames[(number + 1) // steps_per_frame - 1]
             frame[:, :3] = state.position
             frame[:, 3:6] = state.velocity
             frame[:, 6:] = state.spin
-        if farthest > far:
-            look_around(c, state)
+        if largest_move > relist_limit:
+            list_neighbours(constants, state)
