@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from typing import TYPE_CHECKING, Annotated
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 from cyclopts.validators import Number
@@ -56,8 +57,16 @@ def engine(
         except OSError as error:
             warnings.warn(f"the outcome cannot be kept: {error}", stacklevel=1)
     about = {"path": str(binary.path), "sha256": binary.sha256, "version": version}
-    heading = f"{version}, binary and contact model {binary.sha256[:12]}: "
-    print_as(as_json, lambda: as_dict(lines, engine=about), lambda: lines_text(lines, heading))
+    name = f"{version}, binary and contact model {binary.sha256[:12]}: "
+    return _print_checked(lines, as_json, {"engine": about}, name)
+
+
+def _print_checked(
+    lines: Sequence[Line], as_json: bool, about: Mapping[str, Any], heading: str = ""
+) -> int:
+    from walkers.second_engine.lines import as_dict, failures, lines_text
+
+    print_as(as_json, lambda: as_dict(lines, about), lambda: lines_text(lines, heading))
     return 1 if failures(lines) else 0
 
 
@@ -112,19 +121,12 @@ def case(
     )
     for term in terms:
         refuse(f"--without {term}", term not in TERMS, f"expected one of {', '.join(TERMS)}")
-    if cycles is not None:
-        try:
-            loaded = with_cycles(loaded, cycles)
-        except ValueError as error:
-            raise input_error("--cycles", str(error)) from error
-    lines = crosscheck(loaded, lookup.out, terms, seeds=seeds, progress=True, engine=engine)
-    name = loaded.name
-    print_as(
-        as_json,
-        lambda: as_dict(lines, case=name, without=terms),
-        lambda: lines_text(lines),
-    )
-    return 1 if failures(lines) else 0
+    try:
+        loaded = loaded if cycles is None else with_cycles(loaded, cycles)
+    except ValueError as error:
+        raise input_error("--cycles", str(error)) from error
+    lines = crosscheck(loaded, at.out, without or (), seeds=seeds, progress=True, engine=engine)
+    return _print_checked(lines, as_json, {"case": loaded.name, "without": without or []})
 
 
 def library(name: Annotated[str | None, Parameter(name="NAME")] = None, /) -> None:

@@ -1,4 +1,7 @@
-"""``walkers check engine``: run the checks on an engine, two decks at a time, and keep the outcome."""
+"""``walkers check engine``: run the checks on an engine, two at a time, and record the outcome.
+
+The checks themselves are in `walkers.second_engine.scenes`.
+"""
 
 from __future__ import annotations
 
@@ -22,33 +25,65 @@ def run_audit(
     engine: Engine | None = None,
     on_done: Callable[[str], None] | None = None,
 ) -> tuple[list[Line], str]:
-    """Run all `CHECKS` or some on an engine, the installed one if None is given: lines, and the engine's version.
+    """Run the checks of `CHECKS` on an engine.
 
-    ``on_done`` is told the name of each check.
+    Parameters
+    ----------
+    only
+        Names of the checks to run; empty: all.
+    engine
+        The engine; None: the installed one.
+    on_done
+        Called with the name of each check when it is done.
+
+    Returns
+    -------
+    lines : list of Line
+        The lines of the checks.
+    version : str
+        The version that the engine prints.
+
+    Raises
+    ------
+    InputError
+        If there is no check of a name in ``only``.
     """
     binary = engine or find_engine()
     with tempfile.TemporaryDirectory(prefix="walkers-audit-") as folder:
-        bench, pool = Bench(binary, Path(folder)), ThreadPoolExecutor(2)
+        bench = Bench(binary, Path(folder))
+        pool = ThreadPoolExecutor(2)
         try:
-            return run_checks(CHECKS, bench, only, on_done, pool.map), bench.version
+            lines = run_checks(CHECKS, bench, only, on_done, pool.map)
+            return lines, bench.version
         finally:
             bench.stop.set()
             pool.shutdown(cancel_futures=True)
 
 
 def record(lines: Sequence[Line], engine: Engine, version: str) -> None:
-    """Keep an audit for the user: runs with this binary name it, and are refused if it failed.
+    """Record an audit for the user: runs with this binary name it, and are refused if it failed.
 
-    An audit with lines that could not be measured is not kept, because the reason is the machine, not the binary.
+    An audit with lines that could not be measured is not recorded, because the machine is the
+    reason, not the binary.
+
+    Parameters
+    ----------
+    lines
+        The lines of all checks.
+    engine
+        The engine that was checked.
+    version
+        The version that the engine prints.
     """
-    if not any(line.verdict is Verdict.ERROR for line in lines):
-        failed = [line.quantity for line in failures(lines)]
-        outcome = {
-            "passed": not failed,
-            "lines": len(lines),
-            "failures": failed,
-            "date": iso_time(time.time()),
-        }
-        write_audit(
-            engine.sha256, {"contact_model": model_sha256(engine), "version": version, **outcome}
-        )
+    if any(line.verdict is Verdict.ERROR for line in lines):
+        return
+    failed = [line.quantity for line in failures(lines)]
+    outcome = {
+        "contact_model": model_sha256(engine),
+        "version": version,
+        "passed": not failed,
+        "lines": len(lines),
+        "failures": failed,
+        "date": iso_time(time.time()),
+    }
+    write_audit(engine.sha256, outcome)

@@ -1,4 +1,8 @@
-"""Checks are lines: a quantity, its expected and measured value, and the tolerance."""
+"""Lines of checks: a quantity, its expected and measured value, and the tolerance.
+
+The module runs checks, judges and prints their lines. What is checked stands elsewhere, such as in
+`walkers.second_engine.scenes`.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +19,15 @@ from walkers.runner.failures import EngineFailure
 from walkers.text import aligned
 
 T = TypeVar("T")
+Map = Callable[[Callable[[str], list["Line"]], Iterable[str]], Iterable[list["Line"]]]
+"""`map`, or the ``map`` of a pool: applies a function to the names of checks, in their order."""
 
 
 class Verdict(StrEnum):
-    """Outcome of a line: ``ERROR`` if it could not be measured, ``NOT_JUDGED`` without a tolerance."""
+    """Outcome of a line.
+
+    ``ERROR`` means that it could not be measured, ``NOT_JUDGED`` that it has no tolerance.
+    """
 
     PASS = "pass"
     FAIL = "FAIL"
@@ -28,11 +37,25 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Line:
-    """One comparison, part of the ``check`` of that name.
+    """One comparison of a check.
 
-    ``expected`` and ``measured`` are in ``unit`` (of two engines: LIGGGHTS and the second engine). ``tolerance`` is the
-    largest error that passes, infinite without a judgement. Errors are relative to ``scale``; default: the expected
-    number, or 1 if that is 0. ``decided`` is a verdict that does not follow from the error.
+    Attributes
+    ----------
+    quantity
+        What is compared.
+    expected, measured
+        Both numbers, in ``unit``; of two engines, those of LIGGGHTS and of the second engine.
+    tolerance
+        The largest error that passes; infinite if the line is not judged.
+    unit
+        Unit of both numbers; empty for plain numbers.
+    scale
+        The number, in ``unit``, to which errors are relative. None: the expected number, or 1 if
+        that is zero.
+    decided
+        The verdict, where it does not follow from the error.
+    check
+        Name of the check of which the line is a part.
     """
 
     quantity: str
@@ -47,13 +70,18 @@ class Line:
     @property
     def error(self) -> float:
         """The error that is judged."""
-        return abs(self.measured - self.expected) / (self.scale or abs(self.expected) or 1.0)
+        scale = abs(self.expected) if self.scale is None else self.scale
+        if scale == 0.0:
+            scale = 1.0
+        return abs(self.measured - self.expected) / scale
 
     @property
     def verdict(self) -> Verdict:
-        """Pass or fail by the tolerance; NaN fails."""
-        if self.decided or self.tolerance == inf:
-            return self.decided or Verdict.NOT_JUDGED
+        """Pass or fail by the tolerance, unless the verdict is decided; an error of NaN fails."""
+        if self.decided is not None:
+            return self.decided
+        if self.tolerance == inf:
+            return Verdict.NOT_JUDGED
         return Verdict.PASS if self.error <= self.tolerance else Verdict.FAIL
 
     @property
@@ -63,10 +91,16 @@ class Line:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types; NaN and infinity become null."""
-        names = ("check", "quantity", "unit", "expected", "measured", "error", "tolerance")
-        return json_numbers({name: getattr(self, name) for name in names}) | {
-            "verdict": str(self.verdict)
+        values = {
+            "check": self.check,
+            "quantity": self.quantity,
+            "unit": self.unit,
+            "expected": self.expected,
+            "measured": self.measured,
+            "error": self.error,
+            "tolerance": self.tolerance,
         }
+        return {**json_numbers(values), "verdict": str(self.verdict)}
 
 
 def run_checks(
@@ -74,9 +108,34 @@ def run_checks(
     argument: T,
     only: Collection[str] = (),
     on_done: Callable[[str], None] | None = None,
-    mapped: Callable[[Callable[[str], list[Line]], Iterable[str]], Iterable[list[Line]]] = map,
+    map_function: Map = map,
 ) -> list[Line]:
-    """Lines of checks, or ``only`` of some; a check that cannot be computed is a line. ``on_done`` gets each name."""
+    """Run checks and collect their lines; a check that cannot be computed gives a line that says
+    so.
+
+    Parameters
+    ----------
+    checks
+        Functions that give lines, by the names of the checks.
+    argument
+        What each of these functions is called with.
+    only
+        Names of the checks to run; empty: all.
+    on_done
+        Called with the name of each check when it is done.
+    map_function
+        `map`, or the ``map`` of a pool that runs several checks at once.
+
+    Returns
+    -------
+    list of Line
+        The lines in the order of the checks, each with the name of its check.
+
+    Raises
+    ------
+    InputError
+        If there is no check of a name in ``only``.
+    """
     for name in only:
         if name not in checks:
             raise input_error("check", f"no check {name!r}; {expected_of(name, checks)}")
@@ -85,18 +144,24 @@ def run_checks(
         try:
             lines = list(checks[name](argument))
         except Exception as failure:  # another build of the engine may fail in any way
-            reason = failure.message if isinstance(failure, EngineFailure) else str(failure)
-            reason = reason or type(failure).__name__
-            lines = [Line(f"could not be computed: {reason}", nan, nan, decided=Verdict.ERROR)]
+            lines = [_error_line(failure)]
         if on_done:
             on_done(name)
         return [replace(line, check=name) for line in lines]
 
-    return [
-        line
-        for lines in mapped(lines_of, [name for name in checks if name in only or not only])
-        for line in lines
-    ]
+    chosen = [name for name in checks if name in only or not only]
+    all_lines: list[Line] = []
+    for lines in map_function(lines_of, chosen):
+        all_lines += lines
+    return all_lines
+
+
+def _error_line(failure: Exception) -> Line:
+    """The line of a check that cannot be computed."""
+    reason = failure.message if isinstance(failure, EngineFailure) else str(failure)
+    if not reason:
+        reason = type(failure).__name__
+    return Line(f"could not be computed: {reason}", nan, nan, decided=Verdict.ERROR)
 
 
 def failures(lines: Iterable[Line]) -> list[Line]:
@@ -104,35 +169,53 @@ def failures(lines: Iterable[Line]) -> list[Line]:
     return [line for line in lines if line.failed]
 
 
-def lines_text(lines: Sequence[Line], of: str = "") -> str:
-    """A table below the name of each check, and the number of lines that pass, after the words ``of``."""
-    tables = [
-        f"{check}\n{_table(rows)}\n" for check, rows in groupby(lines, lambda line: line.check)
-    ]
-    passed, failed, unknown = (
-        sum(line.verdict is verdict for line in lines)
-        for verdict in (Verdict.PASS, Verdict.FAIL, Verdict.ERROR)
-    )
-    outcome = f"{failed} of {passed + failed} lines fail" if failed else f"all {passed} lines pass"
-    outcome += f", {unknown} could not be measured" if unknown else ""
-    return "\n".join([*tables, of + outcome])
+def lines_text(lines: Sequence[Line], heading: str = "") -> str:
+    """Tables of the lines of each check, and a sentence on how many of them pass.
+
+    Parameters
+    ----------
+    lines
+        The lines; those of a check follow each other.
+    heading
+        Words before the sentence, such as the name of the engine.
+    """
+    parts = []
+    for check, rows in groupby(lines, lambda line: line.check):
+        parts.append(f"{check}\n{_table(rows)}\n")
+    verdicts = [line.verdict for line in lines]
+    passed = verdicts.count(Verdict.PASS)
+    failed = verdicts.count(Verdict.FAIL)
+    errors = verdicts.count(Verdict.ERROR)
+    outcome = f"all {passed} lines pass"
+    if failed:
+        outcome = f"{failed} of {passed + failed} lines fail"
+    if errors:
+        outcome += f", {errors} could not be measured"
+    parts.append(heading + outcome)
+    return "\n".join(parts)
 
 
 def _table(lines: Iterable[Line]) -> str:
-    rows = [["", "", "expected", "measured"]]
+    """Verdict, quantity, both numbers, unit and error, with a heading."""
+    rows = [["", "", "expected", "measured", "", ""]]
     for line in lines:
-        judged = (
-            f"error {line.error:.1e} of {line.tolerance:.0e}"
-            if isfinite(line.error + line.tolerance)
-            else ""
-        )
-        pair = [
-            f"{value:.6g}" if isfinite(value) else "-" for value in (line.expected, line.measured)
-        ]
-        rows.append([line.verdict, line.quantity, *pair, line.unit, judged])
-    return aligned([[*row, "", ""][:6] for row in rows], right=(2, 3))
+        error = ""
+        if isfinite(line.error + line.tolerance):
+            error = f"error {line.error:.1e} of {line.tolerance:.0e}"
+        expected = _number_text(line.expected)
+        measured = _number_text(line.measured)
+        rows.append([line.verdict, line.quantity, expected, measured, line.unit, error])
+    return aligned(rows, right=(2, 3))
 
 
-def as_dict(lines: Sequence[Line], **more: Any) -> dict[str, Any]:
-    """Plain JSON types of all lines and of further values."""
-    return {**more, "passed": not failures(lines), "lines": [line.as_dict() for line in lines]}
+def _number_text(value: float) -> str:
+    return f"{value:.6g}" if isfinite(value) else "-"
+
+
+def as_dict(lines: Sequence[Line], about: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Plain JSON types of all lines, with values that say what was checked before them."""
+    return {
+        **(about or {}),
+        "passed": not failures(lines),
+        "lines": [line.as_dict() for line in lines],
+    }
