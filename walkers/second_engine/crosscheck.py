@@ -1,15 +1,18 @@
-"""Compare a finished run of LIGGGHTS with the second engine: the same start, samples and analysis.
+"""Compare finished runs of LIGGGHTS with the second engine: the same start, samples and analysis.
 
-`crosscheck` compares a case, `crosschecks` cases of all kinds.
+`crosscheck` runs and compares one case, `cross_check` compares runs that are there, and
+`crosschecks` compares cases of all kinds. Forces on a few beads are compared in
+`walkers.second_engine.scenes`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import degrees, inf, sqrt
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 from scipy.spatial.distance import pdist
@@ -21,36 +24,52 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.gait import averages, measure_walk
-from walkers.postprocess.measure.motion import Motion
+from walkers.postprocess.measure.motion import Group, Motion
 from walkers.second_engine.engine import SecondEngine
 from walkers.second_engine.lines import Line, Verdict
 
-SPEED, GAIT, ORIENTATION = 1e-4, 1e-3, 0.1
-"""Tolerances: velocities of walkers (relative); rotation and sliding, relative to the fastest of them; final
-orientation (degrees)."""
+VELOCITY_TOLERANCE = 1e-4
+"""Largest error of the velocity of walkers that passes, relative to that velocity."""
+GAIT_TOLERANCE = 1e-3
+"""Largest error of rotation, sliding and other velocities that passes, relative to the fastest."""
 SPEED_FLOOR = 2e-3
-"""mm/s; smaller differences are always accepted, for walkers that hardly move."""
-ONE = 0.01
-"""Fraction of the smallest radius within which both motions count as the same."""
+"""Error of a velocity that always passes, mm/s, for walkers that hardly move."""
+ORIENTATION_TOLERANCE = 0.1
+"""Largest error of an orientation at the end that passes, degrees."""
+SAME_MOTION = 0.01
+"""Distance between both positions of a bead, over the smallest radius, up to which two motions
+count as the same."""
 STARTS = 5
-"""Number of starts of a pile in the documentation."""
+"""Number of random starts with which `crosschecks` compares a pile."""
+
+Judgement = Literal["walking", "gait", "orientation", "open contacts", "none"]
+"""How a quantity is judged: by `VELOCITY_TOLERANCE`, `GAIT_TOLERANCE` or `ORIENTATION_TOLERANCE`,
+or not at all. Shares of time with open contacts are left out if they are zero in both engines."""
 
 
-def courses(first: Motion, second: Motion) -> Iterator[Line]:
-    """When and how far two motions diverge; piles, which are chaotic, fail if they diverge in the first cycle."""
-    case = first.case
-    apart = np.linalg.norm(first.position - second.position, axis=-1).max(axis=1)
-    over = np.flatnonzero(apart > ONE * float(first.radius.min()))
-    times = first.time[[over[0] if len(over) else -1, -1]]
-    together, cycles = (case.excitation.frequency * times).tolist()
-    pile = case.mixture is not None
-    name = f"start {case.run.seed}: " if pile else ""
-    early = Verdict.FAIL if pile and together < min(1.0, cycles) else None
-    yield Line(f"{name}cycles of the same motion", cycles, together, decided=early)
-    yield Line(f"{name}largest distance of a bead", 0.0, 1e6 * float(apart.max()), unit="µm")
+@dataclass(frozen=True)
+class ComparedQuantity:
+    """A number that is measured on the motions of both engines.
+
+    Attributes
+    ----------
+    name
+        Name of the quantity in the printed lines.
+    value
+        Its value in ``unit``.
+    unit
+        Unit of the value, such as ``mm/s``; empty for a plain number.
+    judgement
+        How the difference between the engines is judged.
+    """
+
+    name: str
+    value: float
+    unit: str
+    judgement: Judgement
 
 
-def crosscheck(
+def crosscheck(  # noqa: PLR0913 (keyword-only, and described below)
     case: Case,
     out: Path,
     without: Collection[str] = (),
@@ -59,198 +78,336 @@ def crosscheck(
     progress: bool | None = None,
     engine: str | None = None,
 ) -> list[Line]:
-    """Compare the run of a case with the second engine ``without`` some terms; for a pile, runs with several seeds.
+    """Run a case with LIGGGHTS, if it is not finished, and compare it with the second engine.
 
-    ``progress`` and ``engine`` are as for `walkers.run`.
+    Parameters
+    ----------
+    case
+        The case.
+    out
+        Folder of the run directories.
+    without
+        Terms that the second engine leaves out, see `walkers.second_engine.engine.TERMS`.
+    seeds
+        Number of runs with different random starts, for piles.
+    progress, engine
+        As for `walkers.run`.
+
+    Returns
+    -------
+    list of Line
+        LIGGGHTS gives the expected and the second engine the measured numbers.
 
     Examples
     --------
     >>> [line for line in crosscheck(load_case("fig1b"), tmp) if line.failed]
     []
     """
-    cases = [
-        changed_case(case, {"run.seed": case.run.seed + number} if number else {})
-        for number in range(seeds)
-    ]
-    motions = [run(start, out, progress=progress, engine=engine).motion for start in cases]
+    motions = []
+    for number in range(seeds):
+        changes = {"run.seed": case.run.seed + number} if number else {}
+        start = changed_case(case, changes)
+        motions.append(run(start, out, progress=progress, engine=engine).motion)
     return cross_check(motions, without)
 
 
 def cross_check(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Line]:
-    """Compare finished runs of a case, one per start, with the second engine without some terms."""
-    seconds = [simulate(motion, without) for motion in motions]
-    pile, names = motions[0].case.mixture is not None, [*measured(motions[0])]
-    sides = ([[*measured(motion).values()] for motion in side] for side in (motions, seconds))
-    numbers = [np.mean(side, axis=0).tolist() for side in sides]
-    speeds = [
-        abs(speed) for (_, unit), speed in zip(names, numbers[0], strict=True) if unit == "mm/s"
-    ]
+    """Compare finished runs of one case with the second engine.
+
+    Parameters
+    ----------
+    motions
+        Motions of the runs by LIGGGHTS, one for each start.
+    without
+        Terms that the second engine leaves out.
+
+    Returns
+    -------
+    list of Line
+        First the quantities of `measured`, as means over the starts, then for each start the
+        lines of `courses`. Quantities of piles, which are chaotic, are not judged.
+    """
+    case = motions[0].case
+    simulated = [simulate(motion, without) for motion in motions]
+    expected = _mean_quantities(motions)
+    reproduced = _mean_quantities(simulated)
+    speeds = [abs(quantity.value) for quantity in expected if quantity.unit == "mm/s"]
+    fastest = max(speeds, default=0.0)
     lines = []
-    for (quantity, unit), first, second in zip(names, *numbers, strict=True):
-        allowed = {"mm/s": max(GAIT * max(speeds), SPEED_FLOOR), "°": ORIENTATION}.get(unit, inf)
-        if quantity.startswith("velocity"):
-            allowed = max(SPEED * abs(first), SPEED_FLOOR)
-        if unit != "%" or first or second:
-            lines.append(
-                Line(
-                    quantity,
-                    first,
-                    second,
-                    inf if pile else allowed,
-                    unit,
-                    scale=None if pile else 1.0,
-                )
-            )
-    check = f"{motions[0].case.name}: LIGGGHTS (expected) and the second engine (measured)"
-    check += f" without {', '.join(without)}" if without else ""
-    lines += [line for both in zip(motions, seconds, strict=True) for line in courses(*both)]
+    for first, second in zip(expected, reproduced, strict=True):
+        if first.judgement == "open contacts" and first.value == second.value == 0.0:
+            continue
+        line = Line(first.name, first.value, second.value, unit=first.unit)
+        if case.mixture is None:
+            line = replace(line, tolerance=_tolerance(first, fastest), scale=1.0)
+        lines.append(line)
+    for by_liggghts, by_second_engine in zip(motions, simulated, strict=True):
+        lines += courses(by_liggghts, by_second_engine)
+    check = f"{case.name}: LIGGGHTS (expected) and the second engine (measured)"
+    if without:
+        check += f" without {', '.join(without)}"
     return [replace(line, check=check) for line in lines]
 
 
-def measured(motion: Motion) -> dict[tuple[str, str], float]:
-    """Numbers of a motion by name and unit: means over the walkers of each make, of loose beads, or of a pile.
+def _mean_quantities(motions: Sequence[Motion]) -> list[ComparedQuantity]:
+    """The quantities of motions of one case, as means over the motions."""
+    quantities: list[ComparedQuantity] = []
+    values = []
+    for motion in motions:
+        quantities = measured(motion)
+        values.append([quantity.value for quantity in quantities])
+    means = np.mean(values, axis=0).tolist()
+    return [replace(quantity, value=mean) for quantity, mean in zip(quantities, means, strict=True)]
 
-    The numbers of a pile are means over the second half of the drive.
+
+def _tolerance(quantity: ComparedQuantity, fastest: float) -> float:
+    """Largest error of a quantity that passes, in its unit; ``fastest`` is a velocity in mm/s."""
+    if quantity.judgement == "walking":
+        return max(VELOCITY_TOLERANCE * abs(quantity.value), SPEED_FLOOR)
+    if quantity.judgement == "gait":
+        return max(GAIT_TOLERANCE * fastest, SPEED_FLOOR)
+    if quantity.judgement == "orientation":
+        return ORIENTATION_TOLERANCE
+    return inf
+
+
+def courses(first: Motion, second: Motion) -> Iterator[Line]:
+    """When and how far two motions from the same start diverge.
+
+    Piles are chaotic and must diverge some time; they fail if they do so in the first cycle of the
+    drive. Nothing else is judged.
     """
+    case = first.case
+    distance = np.linalg.norm(first.position - second.position, axis=-1).max(axis=1)
+    diverged = np.flatnonzero(distance > SAME_MOTION * float(first.radius.min()))
+    last_common_frame = diverged[0] if len(diverged) else -1
+    frequency = case.excitation.frequency
+    common_cycles = float(frequency * first.time[last_common_frame])
+    cycles = float(frequency * first.time[-1])
+    prefix = ""
+    decided = None
+    if case.mixture is not None:
+        prefix = f"start {case.run.seed}: "
+        if common_cycles < min(1.0, cycles):
+            decided = Verdict.FAIL
+    yield Line(f"{prefix}cycles of the same motion", cycles, common_cycles, decided=decided)
+    farthest = 1e6 * float(distance.max())
+    yield Line(f"{prefix}largest distance of a bead", 0.0, farthest, unit="µm")
+
+
+def measured(motion: Motion) -> list[ComparedQuantity]:
+    """The quantities of a motion that are compared: of a pile, of loose beads, or of walkers."""
     if motion.case.mixture is not None:
-        late = motion.select(slice(int(np.searchsorted(motion.time, motion.time[-1] / 2.0)), None))
-        apart = (pdist(position) for position in late.position)
-        radii = pdist(late.radius[:, None], lambda first, second: first[0] + second[0])
-        touching = sum(int(np.sum(distances < radii)) for distances in apart)
-        return {
-            ("height of the beads", "mm"): 1e3 * float(late.position[..., 2].mean()),
-            ("root mean square velocity", "mm/s"): 1e3
-            * sqrt(float(np.sum(late.velocity**2, axis=-1).mean())),
-            ("touching pairs per bead", ""): touching / late.position[..., 0].size,
-        }
+        return _quantities_of_pile(motion)
     if not motion.groups:
-        displacement = (
-            motion.radius**3 / np.sum(motion.radius**3) @ (motion.position[-1] - motion.position[0])
-        )
-        speeds = (1e3 * displacement / np.ptp(motion.time)).tolist()
-        return {
-            (f"centre of mass along {axis}", "mm/s"): speeds["xyz".index(axis)] for axis in "zyx"
-        }
-    numbers: dict[tuple[str, str], float] = {}
+        return _quantities_of_loose_beads(motion)
+    quantities = []
     for number, group in enumerate(motion.groups, 1):
         label = f" ({number})" if len(motion.groups) > 1 else ""
-        beads = [f"bead {bead + 1}" for bead in range(len(group.radii))]
-        contacts = [
-            *beads,
-            *(f"beads {first + 1}-{second + 1}" for first, second in group.make.pairs),
-        ]
-        numbers[f"velocity{label}", "mm/s"] = 1e3 * float(measure_walk(group)["velocity"].mean())
-        gait, kinds = (
-            averages(group),
-            (("rotation", beads), ("sliding", contacts), ("open", contacts)),
-        )
-        for quantity, places in kinds:
-            factor, unit = (100.0, "%") if quantity == "open" else (1e3, "mm/s")
-            means = (factor * getattr(gait, quantity).mean(axis=0)).tolist()
-            numbers |= {
-                (f"{quantity} {place}{label}", unit): mean
-                for place, mean in zip(places, means, strict=True)
-            }
-        numbers[f"orientation at the end{label}", "°"] = degrees(
-            float(group.orientation[-1].mean())
-        )
-    return numbers
+        quantities += _quantities_of_walkers(group, label)
+    return quantities
+
+
+def _quantities_of_pile(motion: Motion) -> list[ComparedQuantity]:
+    """Means over the second half of the drive."""
+    second_half = slice(int(np.searchsorted(motion.time, motion.time[-1] / 2.0)), None)
+    late = motion.select(second_half)
+    sums_of_radii = pdist(late.radius[:, None], lambda first, second: first[0] + second[0])
+    touching = 0
+    for position in late.position:
+        touching += int(np.sum(pdist(position) < sums_of_radii))
+    height = 1e3 * float(late.position[..., 2].mean())
+    mean_square = float(np.sum(late.velocity**2, axis=-1).mean())
+    pairs_per_bead = touching / late.position[..., 0].size
+    return [
+        ComparedQuantity("height of the beads", height, "mm", "none"),
+        ComparedQuantity("root mean square velocity", 1e3 * sqrt(mean_square), "mm/s", "none"),
+        ComparedQuantity("touching pairs per bead", pairs_per_bead, "", "none"),
+    ]
+
+
+def _quantities_of_loose_beads(motion: Motion) -> list[ComparedQuantity]:
+    """Mean velocity of the centre of mass of beads that are no walkers."""
+    weights = motion.radius**3 / np.sum(motion.radius**3)
+    displacement = weights @ (motion.position[-1] - motion.position[0])
+    along_x, along_y, along_z = (1e3 * displacement / np.ptp(motion.time)).tolist()
+    return [
+        ComparedQuantity("centre of mass along z", along_z, "mm/s", "gait"),
+        ComparedQuantity("centre of mass along y", along_y, "mm/s", "gait"),
+        ComparedQuantity("centre of mass along x", along_x, "mm/s", "gait"),
+    ]
+
+
+def _quantities_of_walkers(group: Group, label: str) -> list[ComparedQuantity]:
+    """Means over the walkers of a kind; the names of the quantities end with its label."""
+    beads = [f"bead {bead + 1}" for bead in range(len(group.radii))]
+    pairs = [f"beads {first + 1}-{second + 1}" for first, second in group.make.pairs]
+    contacts = beads + pairs
+    velocity = 1e3 * float(measure_walk(group)["velocity"].mean())
+    quantities = [ComparedQuantity(f"velocity{label}", velocity, "mm/s", "walking")]
+    gait = averages(group)
+    rotation = (1e3 * gait.rotation.mean(axis=0)).tolist()
+    for bead, value in zip(beads, rotation, strict=True):
+        quantities.append(ComparedQuantity(f"rotation {bead}{label}", value, "mm/s", "gait"))
+    sliding = (1e3 * gait.sliding.mean(axis=0)).tolist()
+    for contact, value in zip(contacts, sliding, strict=True):
+        quantities.append(ComparedQuantity(f"sliding {contact}{label}", value, "mm/s", "gait"))
+    open_share = (100.0 * gait.open.mean(axis=0)).tolist()
+    for contact, value in zip(contacts, open_share, strict=True):
+        quantities.append(ComparedQuantity(f"open {contact}{label}", value, "%", "open contacts"))
+    angle = degrees(float(group.orientation[-1].mean()))
+    quantities.append(ComparedQuantity(f"orientation at the end{label}", angle, "°", "orientation"))
+    return quantities
 
 
 def with_cycles(case: Case, cycles: int) -> Case:
     """The case with a number of cycles in one segment, a third of them for settling.
 
-    ``ValueError`` if samples are taken more rarely, or there would be too few.
+    Raises
+    ------
+    ValueError
+        If the case is sampled less than once a cycle and ``cycles`` is no multiple of the cycles
+        between samples, or if there would be fewer than three samples.
     """
-    rare = case.run.cycles_per_sample
-    least = 3 * rare
-    if cycles < least or cycles % rare:
-        raise ValueError(
-            f"expected at least {least}" + (f", a multiple of {rare}" if rare > 1 else "")
-        )
-    lengths = ("cycles", "most_cycles", "duration", "settling_cycles")
-    run = {key: value for key, value in case.document.get("run", {}).items() if key not in lengths}
-    return build_case(
-        {**case.document, "run": {**run, "cycles": cycles}}, source=case.name, name=case.name
-    )
+    cycles_per_sample = case.run.cycles_per_sample
+    least = 3 * cycles_per_sample
+    if cycles < least or cycles % cycles_per_sample:
+        expected = f"expected at least {least}"
+        if cycles_per_sample > 1:
+            expected += f", a multiple of {cycles_per_sample}"
+        raise ValueError(expected)
+    table = dict(case.document.get("run", {}))
+    for length in ("cycles", "most_cycles", "duration", "settling_cycles"):
+        table.pop(length, None)
+    table["cycles"] = cycles
+    return build_case({**case.document, "run": table}, source=case.name, name=case.name)
 
 
 def simulate(motion: Motion, without: Collection[str] = ()) -> Motion:
-    """Repeat a run from its first frame, with its restarts, by the second engine without some terms."""
+    """Repeat a run from its first frame by the second engine.
+
+    Parameters
+    ----------
+    motion
+        Motion of the run by LIGGGHTS. Where it was continued from a restart file, forces are
+        evaluated anew, as LIGGGHTS does.
+    without
+        Terms that the second engine leaves out.
+
+    Returns
+    -------
+    Motion
+        The motion by the second engine, with frames at the same times.
+    """
     first = np.concatenate([motion.position[:1], motion.velocity[:1], motion.spin[:1]], axis=-1)
     clock = round(float(motion.time[0]) / motion.case.run.time_step)
     engine = SecondEngine(motion.case, motion.radius, first[0], clock=clock, without=without)
-    parts = [(first, np.zeros_like(motion.spin[:1])), *_advanced(engine, motion)]
-    frames, spins = (np.concatenate([part[which] for part in parts]) for which in (0, 1))
-    position, velocity, spin = (frames[..., column : column + 3] for column in (0, 3, 6))
+    parts = [first]
+    mean_spins = [np.zeros_like(motion.spin[:1])]
+    for frames, spins in _advanced(engine, motion):
+        parts.append(frames)
+        mean_spins.append(spins)
+    states = np.concatenate(parts)
     return replace(
         motion,
-        position=position,
-        velocity=velocity,
-        spin=spin,
-        mean_spin=spins if motion.groups else None,
+        position=states[..., :3],
+        velocity=states[..., 3:6],
+        spin=states[..., 6:],
+        mean_spin=np.concatenate(mean_spins) if motion.groups else None,
     )
 
 
 def _advanced(engine: SecondEngine, motion: Motion) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Frames after the first and the mean spins since the frame before, in parts: cycles of walkers, else segments."""
+    """Advance the engine through the times of a motion, part after part.
+
+    Yields
+    ------
+    frames : ndarray, shape (F, N, 9)
+        Position (m), velocity (m/s) and spin (rad/s) of N beads in the next F frames.
+    mean_spin : ndarray, shape (F, N, 3)
+        Spins, rad/s, averaged over the steps since the previous frame. For motions without walkers,
+        the spins of the frames.
+    """
     steps = np.rint(motion.time / motion.case.run.time_step).astype(np.int64)
     segments = [segment for segment, _ in motion.frames]
-    if motion.groups:
-        begins = list(range(1, len(steps), motion.case.run.samples_per_cycle))[1:]
-    else:
-        begins = [frame for frame in range(2, len(steps)) if segments[frame] != segments[frame - 1]]
-    for begin, end in pairwise([1, *begins, len(steps)]):
+    for begin, end in pairwise(_part_bounds(motion)):
         if segments[begin] != segments[begin - 1]:
             engine.evaluate()
         length = int(steps[end - 1] - steps[begin - 1])
-        every = length // (end - begin)
-        dense = engine.run(length, 1 if motion.groups else every)
-        frames = dense[every - 1 :: every].copy() if motion.groups else dense
+        steps_per_frame = length // (end - begin)
+        if motion.groups:
+            # Mean spins need the spins of all steps.
+            dense = engine.run(length, 1)
+            frames = dense[steps_per_frame - 1 :: steps_per_frame].copy()
+        else:
+            dense = engine.run(length, steps_per_frame)
+            frames = dense
         yield frames, dense[..., 6:].reshape(end - begin, -1, dense.shape[1], 3).mean(axis=1)
 
 
+def _part_bounds(motion: Motion) -> list[int]:
+    """First frame of each part of a motion after its first frame, and the number of all frames.
+
+    Parts are cycles for walkers, so that arrays of all steps stay small, and otherwise segments.
+    """
+    count = len(motion.time)
+    if motion.groups:
+        return [*range(1, count, motion.case.run.samples_per_cycle), count]
+    segments = [segment for segment, _ in motion.frames]
+    begins = [frame for frame in range(2, count) if segments[frame] != segments[frame - 1]]
+    return [1, *begins, count]
+
+
 def crosschecks(out: Path) -> Iterator[Line]:
-    """Run cases of all kinds in both engines; errors: see `crosscheck`."""
+    """Compare the cases of `full_cases`; ``out`` is the folder of the run directories."""
     for name, case in full_cases().items():
-        for line in crosscheck(case, out, seeds=STARTS if case.mixture else 1):
+        seeds = STARTS if case.mixture else 1
+        for line in crosscheck(case, out, seeds=seeds):
             yield replace(line, quantity=f"{name}: {line.quantity}")
 
 
 def full_cases() -> dict[str, Case]:
-    """Walkers, climbers, clusters, other drives and walls, and a small pile."""
-    alone = {"dimers.replicates": 2, "dimers.facing": "right"}
-    walker, symmetric = (read_toml(shipped("case")[name]) for name in ("fig1b", "symmetric"))
+    """Walkers, climbers, clusters, other drives and walls, and a small pile, by name."""
+    two_to_the_right = {
+        "dimers.angle": "30 deg",
+        "dimers.replicates": 2,
+        "dimers.facing": "right",
+    }
+    groove = {"boundary.shape": "groove", "boundary.opening": "120 deg"}
+    return {
+        "fig1b": load_case("fig1b"),
+        "fig4a": load_case("fig4a"),
+        "fig4b": load_case("fig4b"),
+        "alignment from 30°": with_cycles(load_case("fig1b", two_to_the_right), 40),
+        "symmetric from 30°": with_cycles(load_case("symmetric", two_to_the_right), 40),
+        "fan of three": with_cycles(_fan_of_three(), 24),
+        "two tones": with_cycles(_two_tones(), 24),
+        "slope of 5°": with_cycles(load_case("fig1b", {"boundary.tilt": "5 deg"}), 24),
+        "groove of 120°": with_cycles(load_case("fig1b", groove), 24),
+        "climber": with_cycles(load_case("climber"), 20),
+        "cluster in a corner": with_cycles(load_case("cluster"), 21),
+        "pile-ci": with_cycles(load_case("pile-ci"), 24),
+    }
+
+
+def _fan_of_three() -> Case:
+    """The case ``fig1b`` with fans of one large and two small beads in place of its dimers."""
+    tables: dict[str, Any] = read_toml(shipped("case")["fig1b"])
+    del tables["dimers"]
     fan = {
         "arrangement": "fan",
         "radii": ["0.3 mm", "0.2 mm", "0.2 mm"],
         "angle": "20 deg",
         "replicates": 2,
     }
-    clusters = {
-        **{name: table for name, table in walker.items() if name != "dimers"},
-        "clusters": [fan],
-    }
-    tones = [
+    return build_case({**tables, "clusters": [fan]}, name="fig1b")
+
+
+def _two_tones() -> Case:
+    """The case ``symmetric`` with a drive of two harmonics."""
+    tables: dict[str, Any] = read_toml(shipped("case")["symmetric"])
+    harmonics = [
         {"frequency": "80 Hz", "peak_acceleration": "4 g"},
         {"frequency": "160 Hz", "peak_acceleration": "3 g", "phase": "90 deg"},
     ]
-    shorter = {
-        "alignment from 30°": (load_case("fig1b", {"dimers.angle": "30 deg", **alone}), 40),
-        "symmetric from 30°": (load_case("symmetric", {"dimers.angle": "30 deg", **alone}), 40),
-        "fan of three": (build_case(clusters, name="fig1b"), 24),
-        "two tones": (
-            build_case({**symmetric, "drive": {"harmonics": tones}}, name="symmetric"),
-            24,
-        ),
-        "slope of 5°": (load_case("fig1b", {"boundary.tilt": "5 deg"}), 24),
-        "groove of 120°": (
-            load_case("fig1b", {"boundary.shape": "groove", "boundary.opening": "120 deg"}),
-            24,
-        ),
-        "climber": (load_case("climber"), 20),
-        "cluster in a corner": (load_case("cluster"), 21),
-        "pile-ci": (load_case("pile-ci"), 24),
-    }
-    whole = {name: load_case(name) for name in ("fig1b", "fig4a", "fig4b")}
-    return whole | {name: with_cycles(case, cycles) for name, (case, cycles) in shorter.items()}
+    return build_case({**tables, "drive": {"harmonics": harmonics}}, name="symmetric")
