@@ -31,8 +31,16 @@ from walkers.physics.contact import Impact, reduced_modulus
 from walkers.physics.laws import young_laplace
 from walkers.runner.binary import find_engine
 from walkers.second_engine.lines import Line
-from walkers.second_engine.scenes import DRY, FLOOR, STILL, Bench, R, bench_case, over, recording
-from walkers.templates.deck import Plan
+from walkers.second_engine.scenes import (
+    DRY,
+    FLOOR,
+    STILL,
+    Bench,
+    R,
+    bench_case,
+    over,
+    recorded_plan,
+)
 from walkers.templates.placement import Bead, PlacedBodies, loading_of, surface_of
 
 FRICTION, G = 0.2, 9.81
@@ -115,13 +123,13 @@ def followed(
     scene = PlacedBodies(
         tuple(placed), tuple(walls), *room, tuple(kinds), tuple(map(loading_of, cases))
     )
-    return bench.run(Plan(cases[0], scene, **recording(steps, every))).frames
+    return bench.run(recorded_plan(cases[0], scene, steps, every)).frames
 
 
 def thrown(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
     """A dry bead that is thrown sliding rolls at 5/7 of its speed after 2v/7μg."""
     case, ends = bench_case(_DRY), speed / SLOWS
-    bead = over(FLOOR, -contact_loads(case)[0].overlap, R, (speed, 0.0, 0.0), STILL)
+    bead = over(FLOOR, -contact_loads(case)[0].overlap, R, velocity=(speed, 0.0, 0.0), spin=STILL)
     frames = followed(bench, [case], [bead], 10 * round(0.15 * ends / case.run.time_step), 10)[:, 0]
     slip, time = frames[:, 3] - R * frames[:, 7], 10.0 * case.run.time_step * np.arange(len(frames))
     slope, start = np.polyfit(time[slip > 0.05 * speed], slip[slip > 0.05 * speed], 1)
@@ -188,7 +196,13 @@ def slider(bench: Bench, phase: float) -> FloatArray:
         -5.0 / 7.0 * drift / R,
     )  # so that the centre stays here
     beads = [
-        over(FLOOR, gap, R, (moves * speed, 0.0, 0.0), (0.0, turns * speed, 0.0))
+        over(
+            FLOOR,
+            gap,
+            R,
+            velocity=(moves * speed, 0.0, 0.0),
+            spin=(0.0, turns * speed, 0.0),
+        )
         for speed in speeds.tolist()
     ]
     frames = followed(bench, cases, beads, CYCLES * steps, 50)[1 + FIRST * steps // 50 :]
@@ -249,7 +263,7 @@ def restitutions(
     ]
     high, far = 1.001 * FILM, 1.01 * bridge_at_rest(plain, GLASS, inf).rupture
     beads = [
-        over(FLOOR, high, GLASS, (0.0, 0.0, -speed), STILL)
+        over(FLOOR, high, GLASS, velocity=(0.0, 0.0, -speed), spin=STILL)
         for _ in OILS
         for speed in SPEEDS.tolist()
     ]
