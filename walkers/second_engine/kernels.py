@@ -33,6 +33,9 @@ import numba
 from walkers.arrays import BoolArray, FloatArray, IntArray, Vector
 
 compiled = numba.njit(cache=True, error_model="numpy")
+"""Decorator of kernels."""
+inlined = numba.njit(cache=True, error_model="numpy", inline="always")
+"""Decorator of kernels of the innermost loop, whose calls would be slow."""
 
 CELLS = 512
 """Number of cells of each of the three pieces of a bridge's splines."""
@@ -390,7 +393,7 @@ def add_force(  # noqa: PLR0913, PLR0917 (a kernel, whose arguments are numbers 
         state.torque[bead, axis] += sign * couple[axis] - arm * moment[axis]
 
 
-@compiled
+@inlined
 def separation(constants: Constants, state: State, i: int, j: int) -> tuple[Vector, float]:
     """Normal and gap of a bead i and a body j, which is a wall if j is no number of a bead.
 
@@ -418,7 +421,7 @@ def separation(constants: Constants, state: State, i: int, j: int) -> tuple[Vect
     return normal, constants.cylinder_radius[wall] - axis_distance - radius
 
 
-@compiled
+@inlined
 def updated_bridge(bridges: BridgeSplines, state: State, i: int, j: int, gap: float) -> int:
     """Index of the bridge of a pair at a gap (m), or -1; bridges form and break here.
 
@@ -440,7 +443,7 @@ def updated_bridge(bridges: BridgeSplines, state: State, i: int, j: int, gap: fl
     return -1
 
 
-@compiled
+@inlined
 def new_bridge(bridges: BridgeSplines, state: State, i: int, j: int, gap: float) -> int:
     """Index of the bridge that forms between two bodies at a gap (m), or -1.
 
@@ -542,7 +545,7 @@ def body_acceleration(constants: Constants, clock: int) -> Vector:
     return acceleration
 
 
-@compiled
+@inlined
 def contact_of(  # noqa: PLR0913, PLR0917 (a kernel, whose arguments are numbers and arrays)
     constants: Constants, state: State, i: int, j: int, normal: Vector, gap: float
 ) -> Contact:
