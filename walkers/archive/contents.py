@@ -1,4 +1,8 @@
-"""Contents of an archive: the files of a run or a sweep, and what repeats the runs with the engine alone."""
+"""Contents of an archive: the files of a run or a sweep, and what repeats runs with the engine
+alone.
+
+The zip file is written in `walkers.archive.writing`.
+"""
 
 from __future__ import annotations
 
@@ -25,30 +29,39 @@ from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_sweep_record, s
 from walkers.templates.deck import BRIDGES_NAME, DECK_NAME
 
 RECORD_FILE = "archive.json"
-"""Machine-readable description of an archive: its authors, and the programs that made each run."""
+"""Description of an archive for programs: its authors, and the software that made each run."""
 README_FILE = "README.md"
 """Description of an archive for readers."""
 SUMS_NAME = "sha256sums.txt"
 """List of checksums in an archive, in the format of ``sha256sum -c``."""
-RUNS = "runs"
+RUNS_FOLDER = "runs"
 """Folder of the run directories in an archive: the default folder of the program."""
 MODEL_FOLDER = "contact_model"
 """Folder of the sources of the contact model in an archive."""
 REPEAT_NAME = "repeat.sh"
 """Script of an archive that repeats a run with the engine alone."""
 _DUMPS = ("beads.bin", "bridges.*.txt", "state.restart")
-"""Names of the dumps of the engine; ``bridges.txt`` has the tables of forces, which a deck needs."""
+"""Names of the dumps of the engine. ``bridges.txt`` is none: it has the tables of forces, which a
+deck needs."""
 
 
 class ArchiveFile(NamedTuple):
-    """A file of an archive: its source or its contents, and its SHA-256."""
+    """A file of an archive.
+
+    Attributes
+    ----------
+    source
+        The file on this machine, or its contents.
+    sha256
+        Its SHA-256 in hexadecimal digits.
+    """
 
     source: Path | bytes
     sha256: str
 
     @classmethod
     def of(cls, source: Path | bytes) -> ArchiveFile:
-        """A file whose checksum no manifest has."""
+        """A file, or contents, whose checksum is computed because no manifest has it."""
         if isinstance(source, bytes):
             return cls(source, hashlib.sha256(source).hexdigest())
         return cls(source, checksum(source))
@@ -67,15 +80,15 @@ class Contents:
     Attributes
     ----------
     name, title
-        Of the run or the sweep.
+        Name and title of the run or the sweep.
     manifests
-        Manifests of all runs by the places of their folders in the archive.
+        Manifests of all runs, by the paths of their folders in the archive.
     cases
-        Cases of all runs by these places.
+        Cases of all runs, by the paths of their folders in the archive.
     files
-        Files by their places in the archive.
+        Files, by their paths in the archive.
     main
-        Places of the runs that the archive is about: not those of spreads and accuracies.
+        Folders of the runs that the archive is about, without those of spreads and accuracies.
     """
 
     name: str
@@ -87,29 +100,34 @@ class Contents:
 
     @property
     def finished(self) -> str:
-        """End of the last run, ISO 8601."""
+        """Time when the last run was finished, ISO 8601."""
         return max(str(manifest["finished"]) for manifest in self.manifests.values())
 
     @property
     def companions(self) -> bool:
-        """Whether there are runs of spreads or accuracies."""
+        """Whether the archive has runs of spreads or accuracies too."""
         return len(self.manifests) > len(self.main)
 
     @property
     def left_out(self) -> bool:
         """Whether dumps of the runs that the archive is about are left out."""
-        return any("left_out" in self.manifests[place] for place in self.main)
+        return any("left_out" in self.manifests[run] for run in self.main)
 
-    def deck_folder(self, place: str) -> str:
-        """Folder of the first deck of a run, relative to the run; ``.`` for a deck that was run by hand."""
+    def deck_folder(self, run: str) -> str:
+        """Folder of the first deck of a run, relative to the folder of the run.
+
+        It is ``.`` for a deck that was run by hand. ``run`` is the folder of the run in the
+        archive.
+        """
         for folder in (DECK_FOLDER, f"{SEGMENTS}/0000"):
-            if f"{place}/{folder}/{DECK_NAME}" in self.files:
+            if f"{run}/{folder}/{DECK_NAME}" in self.files:
                 return folder
         return "."
 
-    def has_tables(self, place: str) -> bool:
+    def has_tables(self, run: str) -> bool:
         """Whether a run has the tables of forces, without which its deck cannot be run."""
-        return (Path(place) / self.deck_folder(place) / BRIDGES_NAME).as_posix() in self.files
+        table = Path(run) / self.deck_folder(run) / BRIDGES_NAME
+        return table.as_posix() in self.files
 
 
 def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
@@ -125,8 +143,8 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
     Returns
     -------
     Contents
-        The files of the run or of the sweep and its runs, of the spreads and accuracies of these runs, and what is
-        needed to repeat them with the engine alone.
+        The files of the run, or of the sweep and its runs; those of the spreads and accuracies of
+        these runs; and what is needed to repeat them with the engine alone.
 
     Raises
     ------
@@ -139,22 +157,37 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
         points = states(record)
         unfinished = sum(state.status != "finished" for state in points)
         if unfinished:
-            message = f"{unfinished} of {len(points)} points are not finished; see: walkers list {directory}"
-            raise input_error(directory, message)
-        name, title = name_of(record.directory.name), record.sweep.title
+            raise input_error(
+                directory,
+                f"{unfinished} of {len(points)} points are not finished; "
+                f"see: walkers list {directory}",
+            )
+        name = name_of(record.directory.name)
+        title = record.sweep.title
         main = packing.add_sweep(record, name)
     else:
         main = [packing.add_run(directory)]
         title = packing.cases[main[0]].title
         name = Path(main[0]).name
-    for place in main:
-        packing.add_companions(packing.directories[place])
+    for run in main:
+        packing.add_companions(packing.directories[run])
     packing.add_engine()
-    return Contents(name, title, packing.manifests, packing.cases, packing.files, main)
+    return Contents(
+        name=name,
+        title=title,
+        manifests=packing.manifests,
+        cases=packing.cases,
+        files=packing.files,
+        main=main,
+    )
 
 
 class _Packing:
-    """Files and manifests of an archive, which are collected."""
+    """Collects the files and manifests of an archive.
+
+    ``files``, ``manifests``, ``cases`` and ``directories`` are by paths in the archive. Those of a
+    run are by the path of its folder.
+    """
 
     def __init__(self, dumps: bool) -> None:
         self.dumps = dumps
@@ -162,62 +195,90 @@ class _Packing:
         self.manifests: dict[str, dict[str, Any]] = {}
         self.cases: dict[str, Case] = {}
         self.directories: dict[str, Path] = {}
-        """Directories of the runs by their places in the archive."""
 
     def add(self, place: str, source: Path | bytes) -> None:
         """Add a file that no manifest lists."""
         self.files[place] = ArchiveFile.of(source)
 
     def add_run(self, directory: Path) -> str:
-        """Add the files of a run's manifest, and its case file if that is known; return the place of the run."""
+        """Add the files of a run's manifest, and its case file if that is known.
+
+        Returns
+        -------
+        str
+            The folder of the run in the archive.
+        """
         directory = directory.resolve()
-        place = f"{RUNS}/{directory.name}"
+        place = f"{RUNS_FOLDER}/{directory.name}"
         if place in self.manifests:
             return place
-        manifest, case = read_manifest(directory), case_of(directory)
-        before = set(manifest.get("left_out", ()))
-        left_out = set(before)
-        for name in manifest["files"]:
-            if name in before:
-                continue
-            if not self.dumps and _is_dump(name):
-                left_out.add(name)
-                continue
-            source = directory / name
-            sums = manifest["sha256"]
-            file = ArchiveFile(source, sums[name]) if name in sums else ArchiveFile.of(source)
-            self.files[f"{place}/{name}"] = file
+        manifest = read_manifest(directory)
+        case = case_of(directory)
+        self._add_listed_files(directory, place, manifest)
         if case.document:
             self.add(f"{place}/{name_of(case.name)}.toml", toml_bytes(case.document))
-        if left_out == before:
-            self.add(f"{place}/{MANIFEST_NAME}", directory / MANIFEST_NAME)
-        else:
-            manifest["left_out"] = sorted(left_out)
-            self.add(f"{place}/{MANIFEST_NAME}", json_bytes(manifest))
+        self._add_manifest(directory, place, manifest)
         self.manifests[place] = manifest
         self.cases[place] = case
         self.directories[place] = directory
         return place
 
+    def _add_listed_files(self, directory: Path, place: str, manifest: dict[str, Any]) -> None:
+        """Add the files that a manifest lists and that are in the archive."""
+        sums = manifest["sha256"]
+        left_out = self._left_out(manifest)
+        for name in manifest["files"]:
+            if name in left_out:
+                continue
+            source = directory / name
+            if name in sums:
+                self.files[f"{place}/{name}"] = ArchiveFile(source, sums[name])
+            else:
+                self.add(f"{place}/{name}", source)
+
+    def _add_manifest(self, directory: Path, place: str, manifest: dict[str, Any]) -> None:
+        """Add the manifest of a run. It is changed if dumps are left out that are in the run."""
+        left_out = self._left_out(manifest)
+        if left_out == set(manifest.get("left_out", ())):
+            self.add(f"{place}/{MANIFEST_NAME}", directory / MANIFEST_NAME)
+        else:
+            manifest["left_out"] = sorted(left_out)
+            self.add(f"{place}/{MANIFEST_NAME}", json_bytes(manifest))
+
+    def _left_out(self, manifest: dict[str, Any]) -> set[str]:
+        """Names of the files of a run that are not in the archive."""
+        left_out = set(manifest.get("left_out", ()))
+        if not self.dumps:
+            left_out.update(name for name in manifest["files"] if _is_dump(name))
+        return left_out
+
     def add_sweep(self, record: SweepRecord, name: str) -> list[str]:
-        """Add a sweep, its table and its finished runs; return the places of the runs."""
+        """Add a sweep under a name, its table and its finished runs.
+
+        Returns
+        -------
+        list of str
+            The folders of the runs in the archive.
+        """
         from walkers.sweeps.table import encoded, load_table
 
-        place, table = f"{RUNS}/{name}", load_table(record.directory)
-        # Places in the archive, not paths on this machine.
-        table["run"] = [f"{RUNS}/{Path(run).name}" if run else "" for run in table["run"]]
+        place = f"{RUNS_FOLDER}/{name}"
+        table = load_table(record.directory)
+        # Paths in the archive, not on this machine.
+        table["run"] = [f"{RUNS_FOLDER}/{Path(run).name}" if run else "" for run in table["run"]]
         self.add(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)
         for form in ("csv", "parquet"):
             self.add(f"{place}/table.{form}", encoded(table, form))
         self.add(f"{place}/{name}.toml", toml_bytes(record.sweep.file))
         finished = [state for state in states(record) if state.status == "finished"]
-        places = [self.add_run(state.directory) for state in finished if state.directory]
-        return list(dict.fromkeys(places))
+        runs = [self.add_run(state.directory) for state in finished if state.directory]
+        return list(dict.fromkeys(runs))
 
     def add_companions(self, run: Path) -> None:
-        """Add the spread and the accuracy of a run, which are sweeps beside it, if it has any.
+        """Add the spread and the accuracy of a run directory, which are sweeps beside it, if any.
 
-        One that was interrupted is added as far as it is; it can be continued from the archive.
+        A sweep that was interrupted is added without the runs that it lacks. It can be continued
+        from the archive.
         """
         for suffix in (SPREAD, ACCURACY):
             directory = run.with_name(f"{run.name}{suffix}")
@@ -226,10 +287,10 @@ class _Packing:
             self.add_sweep(read_sweep_record(directory), directory.name)
             bands = directory / SPREAD_NAME
             if bands.is_file():
-                self.add(f"{RUNS}/{directory.name}/{SPREAD_NAME}", bands)
+                self.add(f"{RUNS_FOLDER}/{directory.name}/{SPREAD_NAME}", bands)
 
     def add_engine(self) -> None:
-        """Add what repeats the runs without this program: the contact model, and a script."""
+        """Add what repeats the runs without this program: the contact model and a script."""
         for source in model_sources():
             self.add(f"{MODEL_FOLDER}/{source.name}", source.read_bytes())
         self.add(f"{MODEL_FOLDER}/build.sh", build_script().encode())

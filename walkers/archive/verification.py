@@ -1,4 +1,7 @@
-"""Check whether the files of a run, a sweep or an archive are unchanged."""
+"""Check whether the files of a run, a sweep or an archive are unchanged.
+
+Files are compared with the checksums in the manifests of runs, or in the list of an archive.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import zlib
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from pathlib import Path
 
 from walkers.archive.contents import RECORD_FILE, SUMS_NAME
@@ -17,36 +21,61 @@ from walkers.runner.run_directory import CASE_NAME, SEGMENTS
 from walkers.sweeps.record import RECORD_NAME, read_sweep_record, states
 from walkers.text import printable
 
-_READ = (".json", ".parquet", ".txt", ".lig", ".bin")
-"""Suffixes of the files of a run that are read again."""
-_HARMLESS = ("made since", "left out")
-_UNREADABLE = (OSError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error)
+_READ_SUFFIXES = (".json", ".parquet", ".txt", ".lig", ".bin")
+"""Suffixes of the files of a run that the program reads again."""
+_ZIP_ERRORS = (OSError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error)
 """Errors of reading a zip file that is damaged, encrypted or compressed in an unknown way."""
+
+
+class Finding(StrEnum):
+    """What can be found of a file, in the words that are printed before its name."""
+
+    CHANGED = "changed"
+    MISSING = "missing"
+    NOT_LISTED = "not listed"
+    DOUBTFUL = "doubtful"
+    MADE_SINCE = "made since"
+    LEFT_OUT = "left out"
+
+
+HARMLESS = (Finding.MADE_SINCE, Finding.LEFT_OUT)
+"""Findings that cannot influence a result."""
 
 
 @dataclass(frozen=True)
 class Verification:
-    """Files of a run or an archive, or points of a sweep: a summary, and names by kind, such as ``changed``."""
+    """Outcome for a run, an archive or the points of a sweep.
+
+    Attributes
+    ----------
+    name
+        Name of the run, archive or sweep.
+    summary
+        The outcome in words, such as ``12 files are unchanged``.
+    findings
+        Names of files, or of points of a sweep, by what was found.
+    """
 
     name: str
     summary: str
-    findings: Mapping[str, Sequence[str]]
+    findings: Mapping[Finding, Sequence[str]]
 
     @property
     def passed(self) -> bool:
-        """Whether all listed files are unchanged and no unlisted file could influence a result."""
-        return not any(names for kind, names in self.findings.items() if kind not in _HARMLESS)
+        """Whether all listed files are unchanged and no other file could influence a result."""
+        return not any(names for finding, names in self.findings.items() if finding not in HARMLESS)
 
     def describe(self) -> str:
-        """The outcome, and one line for each file that has changed or is not listed."""
+        """The outcome, and one line for each finding."""
         lines = [f"{self.name}: {self.summary}"]
-        for kind, names in self.findings.items():  # names in archives may contain escape sequences
-            lines += [f"  {kind:<10} {printable(name)}" for name in names]
+        for finding, names in self.findings.items():
+            # Names in archives may contain escape sequences.
+            lines += [f"  {finding:<10} {printable(name)}" for name in names]
         return "\n".join(lines)
 
 
 def verify(path: Path) -> list[Verification]:
-    """Compare a run, the runs of a sweep, or an archive with the checksums in manifests or in the archive.
+    """Compare a run, the runs of a sweep, or an archive with the checksums in manifests or lists.
 
     Parameters
     ----------
@@ -64,118 +93,87 @@ def verify(path: Path) -> list[Verification]:
         If the path is none of these, or the list of checksums of the archive cannot be read.
     """
     if (path / RECORD_NAME).is_file():
-        record = read_sweep_record(path)
-        points = states(record)
-        missing = [
-            f"{run} ({state.status}: point {number})"
-            for number, (run, state) in enumerate(zip(record.runs, points, strict=True))
-            if state.status != "finished"
-        ]
-        runs = [
-            state.directory for state in points if state.directory and state.status == "finished"
-        ]
-        whole = Verification(
-            record.sweep.name, f"{len(runs)} points have a run", {"missing": missing}
-        )
-        return [whole, *map(_of_run, dict.fromkeys(runs))]
-    if (path / SUMS_NAME).is_file():
-        return [_compared(path, _listed(path, (path / SUMS_NAME).read_bytes()))]
+        return _verify_sweep(path)
+    sums = path / SUMS_NAME
+    if sums.is_file():
+        return [_verify_folder(path, _listed_checksums(path, sums.read_bytes()))]
     if (path / MANIFEST_NAME).is_file():
-        return [_of_run(path)]
+        return [_verify_run(path)]
     if path.is_file():
-        return [_of_zip(path)]
-    kinds = f"a run directory (with a {MANIFEST_NAME}), a sweep's ({RECORD_NAME}), or an archive ({SUMS_NAME})"
-    raise input_error(path, f"expected {kinds}")
+        return [_verify_zip(path)]
+    raise input_error(
+        path,
+        f"expected a run directory (with a {MANIFEST_NAME}), a sweep's ({RECORD_NAME}), "
+        f"or an archive ({SUMS_NAME})",
+    )
 
 
-def _of_run(directory: Path) -> Verification:
+def _verify_sweep(directory: Path) -> list[Verification]:
+    """One verification of the points of a sweep, and one of each finished run."""
+    record = read_sweep_record(directory)
+    runs = []
+    missing = []
+    for number, (run, state) in enumerate(zip(record.runs, states(record), strict=True)):
+        if state.status != "finished":
+            missing.append(f"{run} ({state.status}: point {number})")
+        elif state.directory is not None:
+            runs.append(state.directory)
+    summary = f"{len(runs)} points have a run"
+    points = Verification(record.sweep.name, summary, {Finding.MISSING: missing})
+    # Several points may have the same run.
+    return [points, *[_verify_run(run) for run in dict.fromkeys(runs)]]
+
+
+def _verify_run(directory: Path) -> Verification:
     """Compare a run with its manifest; a run without a readable manifest does not pass."""
     try:
         manifest = read_manifest(directory)
-        listed = {CASE_NAME: "", **manifest["sha256"]}  # every run has a case
-        return _compared(directory, listed, manifest.get("left_out", ()))
+        # Every run has a case, also if its manifest does not list it.
+        listed = {CASE_NAME: "", **manifest["sha256"]}
+        return _verify_folder(directory, listed, manifest.get("left_out", ()))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         doubt = f"{MANIFEST_NAME} (it, or a file in its list, cannot be read: {error})"
-        return Verification(
-            directory.resolve().name, "files are not compared", {"doubtful": [doubt]}
-        )
+        name = directory.resolve().name
+        return Verification(name, "files are not compared", {Finding.DOUBTFUL: [doubt]})
 
 
-def _listed(path: Path, text: bytes) -> dict[str, str]:
-    """The checksums in the list of an archive, by the paths of the files; every archive has a record."""
-    listed = {RECORD_FILE: ""}
-    for line in text.decode("utf-8", "replace").splitlines():
-        checksum, _, place = line.partition("  ")
-        if len(checksum) != 64 or not place:
-            raise input_error(
-                path, f"{SUMS_NAME}: expected a checksum and a path, found {line[:80]!r}"
-            )
-        listed[place] = checksum
-    return listed
-
-
-def _of_zip(path: Path) -> Verification:
-    """Compare the files of an archive that is not unpacked with the checksums in it."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            if SUMS_NAME not in archive.namelist():
-                raise input_error(path, f"expected an archive, which has a {SUMS_NAME}")
-            listed = _listed(path, archive.read(SUMS_NAME))
-            entries = Counter(archive.namelist())
-            changed = [
-                name
-                for name, checksum in listed.items()
-                if name in entries and _checksum_in(archive, name) != checksum
-            ]
-    except _UNREADABLE as error:
-        raise input_error(path, f"expected an archive, a zip file ({error})") from error
-    unlisted = [name for name in entries if name not in listed and name != SUMS_NAME]
-    # Of two files of a name, programs that unpack take one or the other.
-    unlisted += [name for name, number in entries.items() if number > 1]
-    findings = {
-        "changed": changed,
-        "missing": [name for name in listed if name not in entries],
-        "not listed": unlisted,
-    }
-    unchanged = len(listed) - len(changed) - len(findings["missing"])
-    return Verification(path.name, f"{unchanged} files are unchanged", findings)
-
-
-def _checksum_in(archive: zipfile.ZipFile, name: str) -> str | None:
-    """SHA-256 of a file in an archive; None if it cannot be read."""
-    try:
-        with archive.open(name) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()  # type: ignore[arg-type]
-    except _UNREADABLE:
-        return None
-
-
-def _compared(
+def _verify_folder(
     folder: Path, listed: Mapping[str, str], left_out: Collection[str] = ()
 ) -> Verification:
-    """Compare the files of a folder with their listed checksums, by relative path."""
+    """Compare the files of a folder with a list.
+
+    Parameters
+    ----------
+    folder
+        A run directory, or the folder of an unpacked archive.
+    listed
+        SHA-256 of the listed files, by their paths relative to the folder.
+    left_out
+        Listed files that may be missing.
+    """
     files = _files_in(folder)
     readable = [name for name, path in files.items() if name in listed and path.is_file()]
     sums = checksums(folder, readable)
     changed = [name for name, checksum in sums.items() if checksum != listed[name]]
-    doubted, new = [], []
+    missing = [name for name in listed if name not in sums and name not in left_out]
+    not_listed = []
+    made_since = []
     for name in files:
         if name in listed or name in (MANIFEST_NAME, SUMS_NAME):
             continue
         if _may_be_read(name):
-            doubted.append(name)
+            not_listed.append(name)
         else:
-            new.append(name)
-    findings = {
-        "changed": changed,
-        "missing": [name for name in listed if name not in sums and name not in left_out],
-        "not listed": doubted,
-        "made since": _with_new_folders(new, listed),
-        "left out": [name for name in left_out if name not in sums],
+            made_since.append(name)
+    findings: dict[Finding, Sequence[str]] = {
+        Finding.CHANGED: changed,
+        Finding.MISSING: missing,
+        Finding.NOT_LISTED: not_listed,
+        Finding.MADE_SINCE: _with_new_folders(made_since, listed),
+        Finding.LEFT_OUT: [name for name in left_out if name not in sums],
     }
-    return Verification(
-        folder.resolve().name, f"{len(sums) - len(changed)} files are unchanged", findings
-    )
+    summary = f"{len(sums) - len(changed)} files are unchanged"
+    return Verification(folder.resolve().name, summary, findings)
 
 
 def _files_in(folder: Path) -> dict[str, Path]:
@@ -189,15 +187,77 @@ def _files_in(folder: Path) -> dict[str, Path]:
 
 
 def _may_be_read(name: str) -> bool:
-    """Whether a file that is not listed could be read as a part of a run, as all in the folder of segments."""
-    return SEGMENTS in Path(name).parts or name.endswith(_READ)
+    """Whether a file that is not listed could be read as a part of a run.
+
+    All files in the folder of segments could.
+    """
+    return SEGMENTS in Path(name).parts or name.endswith(_READ_SUFFIXES)
 
 
 def _with_new_folders(names: Sequence[str], listed: Collection[str]) -> list[str]:
     """Names of files; a folder without listed files stands for all files in it."""
-    listed_folders = {"", *(name.rpartition("/")[0] for name in listed)}
+    listed_folders = {""}
+    for name in listed:
+        listed_folders.add(_folder_of(name))
     shown = []
     for name in names:
-        parent = name.rpartition("/")[0]
-        shown.append(name if parent in listed_folders else f"{parent}/")
+        folder = _folder_of(name)
+        shown.append(name if folder in listed_folders else f"{folder}/")
     return list(dict.fromkeys(shown))
+
+
+def _folder_of(name: str) -> str:
+    """The folder of a relative path; empty without one."""
+    return name.rpartition("/")[0]
+
+
+def _verify_zip(path: Path) -> Verification:
+    """Compare the files of an archive that is not unpacked with the checksums in it."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+            if SUMS_NAME not in names:
+                raise input_error(path, f"expected an archive, which has a {SUMS_NAME}")
+            listed = _listed_checksums(path, archive.read(SUMS_NAME))
+            present = [name for name in listed if name in names]
+            sums = {name: _checksum_in(archive, name) for name in present}
+    except _ZIP_ERRORS as error:
+        raise input_error(path, f"expected an archive, a zip file ({error})") from error
+    changed = [name for name in present if sums[name] != listed[name]]
+    missing = [name for name in listed if name not in sums]
+    entries = Counter(names)
+    not_listed = [name for name in entries if name not in listed and name != SUMS_NAME]
+    # Of two files of the same name, programs that unpack take either one.
+    not_listed += [name for name, count in entries.items() if count > 1]
+    findings = {
+        Finding.CHANGED: changed,
+        Finding.MISSING: missing,
+        Finding.NOT_LISTED: not_listed,
+    }
+    unchanged = len(present) - len(changed)
+    return Verification(path.name, f"{unchanged} files are unchanged", findings)
+
+
+def _listed_checksums(path: Path, text: bytes) -> dict[str, str]:
+    """The checksums in the list of an archive, by the paths of the files.
+
+    Every archive has a record, also if the list does not have it. `InputError` names ``path``, the
+    archive, if the list cannot be read.
+    """
+    listed = {RECORD_FILE: ""}
+    for line in text.decode("utf-8", "replace").splitlines():
+        checksum, _, place = line.partition("  ")
+        if len(checksum) != 64 or not place:
+            expected = f"{SUMS_NAME}: expected a checksum and a path, found {line[:80]!r}"
+            raise input_error(path, expected)
+        listed[place] = checksum
+    return listed
+
+
+def _checksum_in(archive: zipfile.ZipFile, name: str) -> str | None:
+    """SHA-256 of a file in an archive; None if it cannot be read."""
+    try:
+        with archive.open(name) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()  # type: ignore[arg-type]
+    except _ZIP_ERRORS:
+        return None

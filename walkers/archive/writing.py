@@ -34,9 +34,10 @@ def write_archive(
     directory
         The run directory or the directory of the sweep.
     to
-        The zip file; an older one is replaced. None: the name of the run or sweep, in the current folder.
+        The zip file; an older one is replaced. None: a file with the name of the run or sweep, in
+        the current folder.
     dumps
-        Whether to include the dumps of the engine. Tables and results are included all the same.
+        Whether to include the dumps of the engine. Tables and results are included in any case.
     authors
         Names of the authors of the runs.
     licence
@@ -55,15 +56,17 @@ def write_archive(
         If a file differs from its checksum in the manifest of its run.
     """
     require("archive")
-    _check(authors, licence)
+    _check_arguments(authors, licence)
     contents = contents_of(Path(directory), dumps=dumps)
     if to is None:
         to = Path(f"{contents.name}.zip")
     if to.suffix != ".zip" or to.is_dir():
         raise input_error("to", f"expected the name of a .zip file, not {to}")
+    readme_text = readme(contents, authors, licence)
+    record = archive_record(contents, authors, licence)
     files = {
-        README_FILE: ArchiveFile.of(readme(contents, authors, licence).encode()),
-        RECORD_FILE: ArchiveFile.of(json_bytes(archive_record(contents, authors, licence))),
+        README_FILE: ArchiveFile.of(readme_text.encode()),
+        RECORD_FILE: ArchiveFile.of(json_bytes(record)),
         **contents.files,
     }
     sums = "".join(f"{file.sha256}  {place}\n" for place, file in files.items())
@@ -76,7 +79,8 @@ def write_archive(
     return to
 
 
-def _check(authors: Sequence[str], licence: str | None) -> None:
+def _check_arguments(authors: Sequence[str], licence: str | None) -> None:
+    """Refuse authors and a licence that say nothing."""
     if isinstance(authors, str):
         raise input_error("authors", f"expected a list of names, not the text {authors}")
     if not all(name.strip() for name in authors):
@@ -94,5 +98,6 @@ def _write(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, file: ArchiveFile) 
     with archive.open(entry) as written:
         if hashlib.file_digest(written, "sha256").hexdigest() != file.sha256:  # type: ignore[arg-type]
             raise FileChanged(
-                f"{entry.filename} has changed since the run was finished: walkers check files lists all changes"
+                f"{entry.filename} has changed since the run was finished: "
+                "walkers check files lists all changes"
             )
