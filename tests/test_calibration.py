@@ -20,7 +20,7 @@ from tests.printed import spoilt
 from walkers import run
 from walkers.arrays import FloatArray
 from walkers.calibration.calibrate import PROPOSED, Outcome, calibrate, nearest
-from walkers.calibration.emulator import LARGEST, Emulator, Posterior, middle
+from walkers.calibration.emulator import LARGEST_DISTANCE, Emulator, Posterior, middle
 from walkers.calibration.file import Calibration, Parameter, load_calibration, read_calibration
 from walkers.calibration.observations import (
     NO_NUMBERS,
@@ -155,7 +155,7 @@ def test_emulators_know_their_error(emulators: tuple[Emulator, ...]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "far"), [("value", -LARGEST), ("least", -LARGEST), ("most", LARGEST)]
+    ("given", "far"), [("value", -LARGEST_DISTANCE), ("least", -LARGEST_DISTANCE), ("most", LARGEST_DISTANCE)]
 )
 def test_what_does_not_exist_is_far_off(given: str, far: float) -> None:
     outcome = np.where(DESIGN[:, 0] > 0.5, np.nan, 1.0)

@@ -1,4 +1,5 @@
-"""Calibration of unpublished parameters to published numbers: designs, emulators, posterior, predictions.
+"""Calibration of unpublished parameters to published numbers: designs, emulators, posteriors.
 
-It uses sweeps; all physics is in the calibration file (`walkers.calibration.file`) and in the engine.
+The experiments are sweeps. All physics is in the calibration file (`walkers.calibration.file`)
+and in the engine.
 """

@@ -1,4 +1,9 @@
-"""Emulators of the engine between parameter sets, and the posterior of the parameters from them."""
+"""Emulators of the engine between parameter sets, and the posterior of the parameters from them.
+
+Parameter sets are points of the unit cube of the prior: a coordinate is the share of the prior
+below the value of a parameter (`walkers.calibration.file.Parameter.values`). The runs are made in
+`walkers.calibration.calibrate`.
+"""
 
 from __future__ import annotations
 
@@ -17,123 +22,236 @@ from walkers.arrays import FloatArray
 from walkers.calibration.observations import Observation
 from walkers.inputs.axes import unit_cube
 
-LARGEST = 10.0
-"""Deviations at which distances from a fact end, so that sets that are far off do not shape the emulators."""
-_FREEDOM = 4.0
-"""Degrees of freedom of Student's t: a fact that no set reproduces does not outweigh all others."""
-_KEPT, _AT_ONCE = 4000, 8192
+LARGEST_DISTANCE = 10.0
+"""Distance from a fact, in deviations, to which larger ones are reduced, so that sets that are far
+off do not shape the emulators."""
+_DEGREES_OF_FREEDOM = 4.0
+"""Degrees of freedom of Student's t, whose long tails keep a fact that no set reproduces from
+outweighing all others."""
+_SAMPLES = 4000
+"""Number of samples of equal weight of a posterior."""
+_POINTS_AT_ONCE = 8192
+"""Number of points for which emulators are evaluated at once, to limit the memory."""
 
 
 def middle(observation: Observation) -> float:
-    """The value of a fact, its only limit, or the middle of both."""
+    """The value of a fact, its only limit, or the middle of both limits."""
     return float(np.mean([limit for limit in observation.limits if np.isfinite(limit)]))
 
 
 def distances(observation: Observation, numbers: FloatArray) -> FloatArray:
-    """What an emulator learns: distances of numbers from the `middle` in deviations, at most `LARGEST`.
+    """Distances of numbers from the `middle` of a fact, which are what an emulator learns.
 
-    A number that does not exist is as far off as one can be, on the side where no limit allows it.
+    Parameters
+    ----------
+    observation
+        The fact.
+    numbers : ndarray, shape (P,)
+        Numbers of the engine in SI units, angles in degrees; NaN where a number does not exist.
+
+    Returns
+    -------
+    ndarray, shape (P,)
+        Distances in deviations, at most `LARGEST_DISTANCE`. A number that does not exist has the
+        largest distance, on the side where no limit allows it.
     """
-    away = np.clip((numbers - middle(observation)) / observation.deviation, -LARGEST, LARGEST)
-    return np.where(np.isnan(numbers), -LARGEST if observation.most is None else LARGEST, away)
+    scaled = (numbers - middle(observation)) / observation.deviation
+    clipped = np.clip(scaled, -LARGEST_DISTANCE, LARGEST_DISTANCE)
+    missing = LARGEST_DISTANCE
+    if observation.most is None:
+        missing = -LARGEST_DISTANCE
+    return np.where(np.isnan(numbers), missing, clipped)
 
 
 @dataclass(frozen=True)
 class Emulator:
-    """One observation as a function of D parameters: a Gaussian process of its `distances` from the fact."""
+    """One observation as a function of D parameters.
+
+    Attributes
+    ----------
+    observation
+        The fact and its number.
+    process
+        A fitted Gaussian process of scikit-learn for the `distances` from the fact.
+    error
+        Root mean square error of the process at sets that are left out of it, one after the other,
+        in deviations.
+    inflation
+        Factor by which these errors are larger than the process states, at least 1.
+    """
 
     observation: Observation
-    process: Any  # of scikit-learn, fitted
-    error: float  # root mean square, in deviations, of sets that are left out one after the other
-    inflation: float  # factor by which the process takes these errors for smaller; at least 1
+    process: Any
+    error: float
+    inflation: float
 
     @classmethod
     def of(
-        cls, observation: Observation, unit: FloatArray, numbers: FloatArray, seed: int
+        cls, observation: Observation, points: FloatArray, numbers: FloatArray, seed: int
     ) -> Emulator:
-        """Fit sets (P, D) of the unit cube and the numbers of the engine there (P,); NaN where there is none."""
+        """Fit an emulator to numbers of the engine.
+
+        Parameters
+        ----------
+        observation
+            The fact and its number.
+        points : ndarray, shape (P, D)
+            Parameter sets, points of the unit cube of the prior.
+        numbers : ndarray, shape (P,)
+            Numbers of the engine there, in SI units; NaN where a number does not exist.
+        seed
+            Seed of the search for the scales of the process.
+
+        References
+        ----------
+        C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning (2006), eqs.
+        5.10 to 5.12 (errors of points that are left out).
+        """
         from sklearn.gaussian_process import GaussianProcessRegressor
         from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
-        away = distances(observation, numbers)
-        kernel = ConstantKernel(1.0, (1e-2, 1e2)) * Matern(
-            np.ones(unit.shape[1]), (5e-2, 2e1), nu=2.5
-        )
+        learned = distances(observation, numbers)
+        amplitude = ConstantKernel(1.0, (1e-2, 1e2))
+        smooth = Matern(np.ones(points.shape[1]), (5e-2, 2e1), nu=2.5)
+        noise = WhiteKernel(1e-2, (1e-6, 1.0))
         process = GaussianProcessRegressor(
-            kernel + WhiteKernel(1e-2, (1e-6, 1.0)),
+            amplitude * smooth + noise,
             normalize_y=True,
             n_restarts_optimizer=2,
             random_state=seed,
         )
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # scales at a bound, which have no influence
-            process.fit(unit, away)
-        # Rasmussen and Williams, Gaussian Processes for Machine Learning (2006), eqs. 5.10 to 5.12.
-        inverse = np.diag(cho_solve((process.L_, True), np.eye(len(unit))))
-        miss, scale = process.alpha_ / inverse, float(np.std(away)) or 1.0
-        inflation = max(1.0, float(np.sqrt(np.mean((miss * np.sqrt(inverse)) ** 2))))
-        return cls(observation, process, scale * float(np.sqrt(np.mean(miss**2))), inflation)
+            # Scales at a bound belong to parameters without influence.
+            warnings.simplefilter("ignore")
+            process.fit(points, learned)
+        inverse_variance = np.diag(cho_solve((process.L_, True), np.eye(len(points))))
+        misses = process.alpha_ / inverse_variance
+        standardised = misses * np.sqrt(inverse_variance)
+        inflation = max(1.0, float(np.sqrt(np.mean(standardised**2))))
+        scale = float(np.std(learned))
+        if scale == 0.0:
+            scale = 1.0
+        error = scale * float(np.sqrt(np.mean(misses**2)))
+        return cls(observation, process, error, inflation)
 
-    def predict(self, unit: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Distance from the fact and its standard error at points (N, D), in deviations."""
+    def predict(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Predict distances from the fact.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, D)
+            Points of the unit cube of the prior.
+
+        Returns
+        -------
+        mean, error : ndarray, shape (N,)
+            Distance and its standard error, in deviations.
+        """
         with warnings.catch_warnings():
-            warnings.filterwarnings(
-                "ignore", "Predicted variances"
-            )  # rounding errors of zero, at sets that were run
-            mean, deviation = self.process.predict(unit, return_std=True)
+            # Variances at sets that were run are zero but for rounding.
+            warnings.filterwarnings("ignore", "Predicted variances")
+            mean, deviation = self.process.predict(points, return_std=True)
         return mean, deviation * self.inflation
 
-    def log_likelihood(self, unit: FloatArray) -> FloatArray:
-        """Logarithm of the probability (density) of the fact at points (N, D)."""
-        mean, error = self.predict(unit)
+    def log_likelihood(self, points: FloatArray) -> FloatArray:
+        """Logarithm of the probability (of a value: of its density) of the fact at points.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, D)
+            Points of the unit cube of the prior.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            For a value, the density of Student's t at its distance; for limits, the probability of
+            the interval between them. The width is that of the fact and of the emulator together.
+        """
+        mean, error = self.predict(points)
         width = np.hypot(1.0, error)
         if self.observation.value is not None:
-            return np.asarray(student.logpdf(mean / width, _FREEDOM) - np.log(width))
-        low, high = (
-            (limit - middle(self.observation)) / self.observation.deviation
-            for limit in self.observation.limits
-        )
-        within = student.cdf((high - mean) / width, _FREEDOM) - student.cdf(
-            (low - mean) / width, _FREEDOM
-        )
-        return np.asarray(np.log(np.maximum(within, 1e-300)))
+            density = student.logpdf(mean / width, _DEGREES_OF_FREEDOM)
+            return np.asarray(density - np.log(width))
+        least, most = self.observation.limits
+        centre = middle(self.observation)
+        low = (least - centre) / self.observation.deviation
+        high = (most - centre) / self.observation.deviation
+        below_high = student.cdf((high - mean) / width, _DEGREES_OF_FREEDOM)
+        below_low = student.cdf((low - mean) / width, _DEGREES_OF_FREEDOM)
+        return np.asarray(np.log(np.maximum(below_high - below_low, 1e-300)))
 
-    def numbers(self, unit: FloatArray, normal: FloatArray) -> FloatArray:
-        """Samples of the number at points (N, D), given N standard normal numbers."""
-        mean, error = self.predict(unit)
-        return np.asarray(
-            middle(self.observation) + self.observation.deviation * (mean + error * normal)
-        )
+    def numbers(self, points: FloatArray, normal: FloatArray) -> FloatArray:
+        """Sample the number of the observation.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, D)
+            Points of the unit cube of the prior.
+        normal : ndarray, shape (N,)
+            Standard normal numbers, which choose the errors of the emulator.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Numbers in SI units, angles in degrees.
+        """
+        mean, error = self.predict(points)
+        sampled = mean + error * normal
+        return np.asarray(middle(self.observation) + self.observation.deviation * sampled)
 
 
 @dataclass(frozen=True)
 class Posterior:
-    """Points of the prior, weighted by the likelihood of the observations that were used."""
+    """Points of the prior, weighted by the likelihood of observations.
 
-    points: FloatArray  # of a Sobol sequence in the unit cube of the prior, shape (N, D)
-    log_weight: FloatArray  # normalised, shape (N,)
+    Attributes
+    ----------
+    points : ndarray, shape (N, D)
+        Points of a Sobol sequence in the unit cube of the prior.
+    log_weight : ndarray, shape (N,)
+        Logarithms of their weights, whose sum is 1.
+    seed
+        Seed of the sequence and of the samples.
+    """
+
+    points: FloatArray
+    log_weight: FloatArray
     seed: int
 
     @classmethod
     def of(
-        cls, emulators: Sequence[Emulator], points: int, seed: int, without: Collection[str] = ()
+        cls, emulators: Sequence[Emulator], count: int, seed: int, without: Collection[str] = ()
     ) -> Posterior:
-        """Weigh points of the prior by the observations that have a weight and are not of the groups ``without``."""
-        used = [
-            emulator
-            for emulator in emulators
-            if emulator.observation.weighed and emulator.observation.group not in without
-        ]
-        unit = unit_cube(used[0].process.n_features_in_, points, seed)
-        parts = [unit[at : at + _AT_ONCE] for at in range(0, points, _AT_ONCE)]
-        total = np.concatenate(
-            [np.sum([emulator.log_likelihood(part) for emulator in used], axis=0) for part in parts]
-        )
-        return cls(unit, total - logsumexp(total), seed)
+        """Weight points of the prior by the likelihood of observations.
+
+        Parameters
+        ----------
+        emulators
+            Emulators of the observations. Those without a weight in a calibration are not used.
+        count
+            Number of points.
+        seed
+            Seed of the points.
+        without
+            Groups of observations that are not used either.
+        """
+        used = []
+        for emulator in emulators:
+            observation = emulator.observation
+            if observation.weighed and observation.group not in without:
+                used.append(emulator)
+        points = unit_cube(used[0].process.n_features_in_, count, seed)
+        log_likelihoods = []
+        for start in range(0, count, _POINTS_AT_ONCE):
+            part = points[start : start + _POINTS_AT_ONCE]
+            of_observations = [emulator.log_likelihood(part) for emulator in used]
+            log_likelihoods.append(np.sum(of_observations, axis=0))
+        log_weight = np.concatenate(log_likelihoods)
+        return cls(points, log_weight - logsumexp(log_weight), seed)
 
     @property
     def effective_samples(self) -> float:
-        """1/Σ w²."""
+        """Effective number of samples, 1/Σ w² with the weights w."""
         return float(np.exp(-logsumexp(2.0 * self.log_weight)))
 
     @property
@@ -143,7 +261,9 @@ class Posterior:
 
     @cached_property
     def samples(self) -> FloatArray:
-        """Points of equal weight, shape (S, D): each in proportion to its weight."""
-        steps = (np.arange(_KEPT) + np.random.default_rng(self.seed).random()) / _KEPT
-        chosen = np.searchsorted(np.cumsum(np.exp(self.log_weight)), steps)
-        return np.asarray(self.points[np.minimum(chosen, len(self.points) - 1)])
+        """Points of equal weight, shape (4000, D): each point in proportion to its weight."""
+        offset = np.random.default_rng(self.seed).random()
+        quantiles = (np.arange(_SAMPLES) + offset) / _SAMPLES
+        chosen = np.searchsorted(np.cumsum(np.exp(self.log_weight)), quantiles)
+        last = len(self.points) - 1
+        return np.asarray(self.points[np.minimum(chosen, last)])

@@ -1,8 +1,8 @@
-"""Observations: facts about walkers, measured or stated, and the numbers of simulations to compare them with.
+"""Observations: facts about walkers, and the numbers of simulations to compare them with.
 
-A calibration weighs its free parameters with them, and the comparison with the paper judges the shipped ones. An
-observation knows no run: `Observation.of_numbers` takes the numbers of each experiment, which `numbers_of` reads from a
-run, and which a theory may give as well.
+A calibration weighs its free parameters with observations, and the comparison with the paper judges
+the shipped ones. An observation knows no run: `Observation.of_numbers` takes the numbers of each
+experiment. `numbers_of` reads them from a run, and a theory may give them as well.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 import numpy as np
 from pydantic import Field, ValidationInfo, field_validator
 
-from walkers.arrays import FloatArray
+from walkers.arrays import FloatArray, IntArray
 from walkers.inputs.config_table import ConfigTable
 from walkers.inputs.units import ANGLE, SPEED, WRITTEN, Number, QuantityKind, parse_quantity
 from walkers.postprocess.measure.gait import settled_samples
@@ -26,36 +26,70 @@ from walkers.runner.run_directory import case_of
 if TYPE_CHECKING:
     import pandas as pd
 
-Speed = Literal["velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"]
+SpeedQuantity = Literal[
+    "velocity", "rotation_1", "rotation_2", "sliding_1", "sliding_2", "sliding_pair_1"
+]
 """Means over the cycles and over steady walkers (`walkers.postprocess.measure.gait`), m/s."""
-Slip = Literal["slip_1", "slip_2"]
-"""How much a bead slides within a cycle: root mean square of its sliding velocity over that of the walker's velocity.
-
-A bead that only rolls has 0, one that is dragged without rolling has 1.
-"""
-ASTRAY = np.pi / 4.0
-"""Largest final angle of a walker that is on the axis, rad."""
-Angle = Literal["largest_angle", "smallest_angle"]
-"""Of all walkers to the drive axis at the end of the run, in either direction, 0 to 90 degrees."""
+SlipQuantity = Literal["slip_1", "slip_2"]
+"""How much a bead slides within a cycle: root mean square of its sliding velocity over that of the
+walker's velocity. A bead that only rolls has 0, one that is dragged without rolling has 1."""
+AngleQuantity = Literal["largest_angle", "smallest_angle"]
+"""Of all walkers, angle to the drive axis at the end of the run, in either direction, 0 to 90
+degrees."""
+SPEED_QUANTITIES = get_args(SpeedQuantity)
+"""Names of the quantities that are speeds."""
+SLIP_QUANTITIES = get_args(SlipQuantity)
+"""Names of the quantities that are shares of sliding, for the first and the second bead."""
+ANGLE_QUANTITIES = get_args(AngleQuantity)
+"""Names of the quantities that are angles."""
 NO_NUMBERS: dict[str, float] = dict.fromkeys(
-    (*get_args(Speed), *get_args(Slip), *get_args(Angle)), nan
+    (*SPEED_QUANTITIES, *SLIP_QUANTITIES, *ANGLE_QUANTITIES), nan
 )
 """Quantities of a run that failed."""
+LARGEST_ANGLE_ON_AXIS = np.pi / 4.0
+"""Largest final angle of a walker that counts as walking along the axis, rad."""
 LEAST_SPEED = 5e-5
-"""m/s; a ratio to a smaller speed has no meaning."""
+"""Smallest speed to which a ratio has a meaning, m/s."""
 Names = Annotated[list[str], Field(min_length=1)]
+"""A list of at least one name."""
 
 
 class Observation(ConfigTable):
     """``[[observations]]``: a fact, where it was found, and the number that it is about.
 
-    The number is the mean of a quantity (`Speed`, `Slip` or `Angle`) over the experiments ``of``, or its ratio to the
-    mean over those ``over``. The fact gives its ``value``, or that it is at ``least`` or at ``most`` so large, and the
-    ``deviation`` within which a number agrees: one standard deviation of the value, the tolerance of a limit. They are
-    in SI units, angles in degrees; a file gives speeds and angles with their unit, other numbers plainly.
+    The number is the mean of a quantity over the experiments ``of``, or the ratio of this mean to
+    the mean over the experiments ``over``. Files give speeds and angles with their units, and
+    other numbers plainly. Here numbers are in SI units, and angles in degrees.
 
-    Observations of a ``group`` are held out together; ``says`` is the fact as it was said. One that is ``derived`` from
-    others, or ``costly`` (its runs are too long for many parameter sets), has no weight in a calibration.
+    Attributes
+    ----------
+    name
+        Name of the observation, which no other has.
+    group
+        Name of the group of observations that are held out together.
+    title
+        Name in tables and figures; default: the name.
+    says
+        The fact as it was said.
+    source
+        Where the fact was found.
+    quantity
+        Name of the quantity: `SpeedQuantity`, `SlipQuantity` or `AngleQuantity`.
+    of
+        Experiments whose mean is the number, or its numerator.
+    over
+        Experiments whose mean is the denominator; empty: the number is no ratio.
+    value
+        The number that was found; None if the fact gives limits.
+    least, most
+        The number is at least or at most this; None without a limit.
+    deviation
+        Distance within which a number agrees: one standard deviation of the value, or the tolerance
+        of a limit.
+    derived
+        Whether the fact follows from others. It then has no weight in a calibration.
+    costly
+        Whether its runs are too long for many parameter sets. It then has no weight either.
     """
 
     name: str
@@ -63,7 +97,7 @@ class Observation(ConfigTable):
     title: str = Field(default_factory=lambda given: str(given.get("name", "")))
     says: str = ""
     source: str = ""
-    quantity: Literal[Speed, Slip, Angle] = "velocity"
+    quantity: Literal[SpeedQuantity, SlipQuantity, AngleQuantity] = "velocity"
     of: Names
     over: list[str] = Field([])
     value: Number | None = None
@@ -76,69 +110,85 @@ class Observation(ConfigTable):
     @field_validator("value", "least", "most", "deviation", mode="before")
     @classmethod
     def _number(cls, value: Any, validation: ValidationInfo) -> Any:
+        """Read a number of a file, with or without a unit as its quantity asks."""
         if validation.context != WRITTEN:
             return value
-        kind = (
-            None
-            if validation.data.get("over")
-            else observation_kind(validation.data.get("quantity", "velocity"))
-        )
-        if isinstance(value, str) == (kind is None):
-            raise ValueError(
-                kind.expectation
-                if kind
-                else "expected a plain number: a ratio or a share has no unit"
-            )
-        number = parse_quantity(value, kind) if kind else value
+        kind = None
+        if not validation.data.get("over"):
+            kind = observation_kind(validation.data.get("quantity", "velocity"))
+        if kind is None:
+            if isinstance(value, str):
+                raise ValueError("expected a plain number: a ratio or a share has no unit")
+            return value
+        if not isinstance(value, str):
+            raise ValueError(kind.expectation)
+        number = parse_quantity(value, kind)
         return degrees(number) if kind is ANGLE else number
 
     @property
     def weighed(self) -> bool:
-        """Whether it has a weight in a calibration."""
+        """Whether the observation has a weight in a calibration."""
         return not (self.derived or self.costly)
 
     @property
     def unit(self) -> tuple[str, float]:
-        """Unit for tables, and the factor to it."""
+        """Unit in tables, and the factor from the number to it."""
         kind = None if self.over else observation_kind(self.quantity)
-        return ("mm/s", 1e3) if kind is SPEED else ("°" if kind is ANGLE else "", 1.0)
+        if kind is SPEED:
+            return "mm/s", 1e3
+        if kind is ANGLE:
+            return "°", 1.0
+        return "", 1.0
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Smallest and largest number that the fact allows, without its deviation; both are the value if it has one."""
+        """Smallest and largest number that the fact allows, without its deviation.
+
+        Both are the value if the fact gives one.
+        """
         if self.value is not None:
             return self.value, self.value
-        return (-inf if self.least is None else self.least), (
-            inf if self.most is None else self.most
-        )
+        least = -inf if self.least is None else self.least
+        most = inf if self.most is None else self.most
+        return least, most
 
     @property
     def text(self) -> str:
         """What is expected, such as ``2.3 ± 0.35 mm/s`` or ``at least 0.3 ± 0.1``."""
         unit, scale = self.unit
-        named = {"": self.value, "at least ": self.least, "at most ": self.most}
-        limits = " and ".join(
-            f"{word}{number * scale:.4g}" for word, number in named.items() if number is not None
-        )
-        return f"{limits} ± {self.deviation * scale:.2g} {unit}".strip()
+        limits = []
+        if self.value is not None:
+            limits.append(f"{self.value * scale:.4g}")
+        if self.least is not None:
+            limits.append(f"at least {self.least * scale:.4g}")
+        if self.most is not None:
+            limits.append(f"at most {self.most * scale:.4g}")
+        return f"{' and '.join(limits)} ± {self.deviation * scale:.2g} {unit}".strip()
 
     def of_numbers(self, numbers: Mapping[str, Mapping[str, float]]) -> float:
-        """The number of this observation, from quantities by experiment (`numbers_of`).
+        """The number of this observation.
 
-        NaN if one that it needs is NaN, or its ratio is to walkers at rest.
+        Parameters
+        ----------
+        numbers
+            Quantities by name (as `numbers_of` gives them), by the names of experiments.
+
+        Returns
+        -------
+        float
+            The number in SI units, angles in degrees. NaN if a quantity that it needs is NaN, or if
+            it is a ratio to walkers at rest.
         """
-        mean = float(np.mean([numbers[label][self.quantity] for label in self.of]))
+        mean = float(np.mean([numbers[experiment][self.quantity] for experiment in self.of]))
         if not self.over:
             return mean
-        below = float(np.mean([numbers[label][self.quantity] for label in self.over]))
-        return (
-            nan
-            if observation_kind(self.quantity) is SPEED and abs(below) < LEAST_SPEED
-            else mean / below
-        )
+        below = float(np.mean([numbers[experiment][self.quantity] for experiment in self.over]))
+        if observation_kind(self.quantity) is SPEED and abs(below) < LEAST_SPEED:
+            return nan
+        return mean / below
 
     def residual(self, number: float) -> float:
-        """How far a number is from what the fact allows, in deviations; NaN for NaN."""
+        """Distance of a number from what the fact allows, in deviations; NaN for NaN."""
         return (number - float(np.clip(number, *self.limits))) / self.deviation
 
     def agrees(self, number: float) -> bool:
@@ -148,55 +198,105 @@ class Observation(ConfigTable):
 
 def observation_kind(quantity: str) -> QuantityKind | None:
     """The kind of a quantity; None if it is a plain number."""
-    return SPEED if quantity in get_args(Speed) else ANGLE if quantity in get_args(Angle) else None
+    if quantity in SPEED_QUANTITIES:
+        return SPEED
+    if quantity in ANGLE_QUANTITIES:
+        return ANGLE
+    return None
 
 
 def numbers_of(run: str | Path) -> dict[str, float]:
-    """All quantities of the finished run of a dimer; NaN where no walker is steady and keeps its beads together."""
+    """All quantities of the finished run of a dimer.
+
+    Parameters
+    ----------
+    run
+        The run directory.
+
+    Returns
+    -------
+    dict
+        The quantities of `NO_NUMBERS`: speeds in m/s, angles in degrees. Speeds and slips are NaN
+        if no walker is steady, and angles are NaN if no walker keeps its beads together.
+    """
     results = read_results(run)
-    walkers, kept = results.table("walkers"), steady_walkers(results)
-    numbers = NO_NUMBERS | {name: float(kept[name].mean()) for name in get_args(Speed)}
-    if len(kept):
-        trajectory = results.columns("trajectory")
-        run_made = case_of(results.directory).for_cycles(round(trajectory["cycle"].max())).run
-
-        def square(column: str) -> float:
-            """Mean square over the measured samples of the walkers that count."""
-            course = trajectory[column].reshape(len(walkers), -1).T
-            return float(np.mean(course[settled_samples(run_made)][:, kept.index] ** 2))
-
-        for bead, name in enumerate(get_args(Slip), 1):
-            numbers[name] = float(np.sqrt(square(f"sliding_{bead}") / square("velocity")))
-    if len(angles := misalignment(walkers[keeps_beads_together(walkers)])):
-        numbers |= {"largest_angle": float(angles.max()), "smallest_angle": float(angles.min())}
+    walkers = results.table("walkers")
+    steady = steady_walkers(results)
+    numbers = dict(NO_NUMBERS)
+    for name in SPEED_QUANTITIES:
+        numbers[name] = float(steady[name].mean())
+    if len(steady):
+        numbers |= _slips(results, walker_count=len(walkers), rows=steady.index.to_numpy())
+    angles = misalignment(walkers[keeps_beads_together(walkers)])
+    if len(angles):
+        numbers["largest_angle"] = float(angles.max())
+        numbers["smallest_angle"] = float(angles.min())
     return numbers
 
 
+def _slips(results: Results, walker_count: int, rows: IntArray) -> dict[str, float]:
+    """The quantities `SlipQuantity` of a run, for the walkers in some rows of its table."""
+    trajectory = results.columns("trajectory")
+    cycles = round(trajectory["cycle"].max())
+    # A run that ended early has fewer cycles than its case.
+    run = case_of(results.directory).for_cycles(cycles).run
+    samples = settled_samples(run)
+
+    def mean_square(column: str) -> float:
+        """Mean square of a column over the measured samples of these walkers, m²/s²."""
+        values = trajectory[column].reshape(walker_count, -1).T
+        return float(np.mean(values[samples][:, rows] ** 2))
+
+    slips = {}
+    for bead, name in enumerate(SLIP_QUANTITIES, 1):
+        ratio = mean_square(f"sliding_{bead}") / mean_square("velocity")
+        slips[name] = float(np.sqrt(ratio))
+    return slips
+
+
 def numbers_in(table: pd.DataFrame) -> list[dict[str, float]]:
-    """`numbers_of` the runs of a sweep's table; NaN for those that are not finished."""
-    points = zip(table["run"], table["status"], strict=True)
-    return [numbers_of(run) if status == "finished" else NO_NUMBERS for run, status in points]
+    """`numbers_of` each run in the table of a sweep; NaN for runs that are not finished."""
+    numbers = []
+    for run, status in zip(table["run"], table["status"], strict=True):
+        if status == "finished":
+            numbers.append(numbers_of(run))
+        else:
+            numbers.append(NO_NUMBERS)
+    return numbers
 
 
 def misalignment(walkers: pd.DataFrame) -> FloatArray:
-    """Angles to the drive axis at the end, in either direction, 0 to 90 degrees, of a table ``walkers``."""
+    """Angles to the drive axis at the end of a run, in either direction.
+
+    Parameters
+    ----------
+    walkers
+        Rows of the table ``walkers`` of a run.
+
+    Returns
+    -------
+    ndarray
+        Angle of each walker, 0 to 90 degrees.
+    """
     ends = np.degrees(walkers["orientation_end"].to_numpy())
     angles: FloatArray = np.abs((ends + 90.0) % 180.0 - 90.0)
     return angles
 
 
 def keeps_beads_together(walkers: pd.DataFrame) -> pd.Series[bool]:
-    """Whether the beads of walkers of a table ``walkers`` stay together."""
+    """Whether the beads of each walker of a table ``walkers`` stay together."""
     return walkers["separated_fraction"] < SEPARATED
 
 
 def steady_walkers(results: Results) -> pd.DataFrame:
-    """Rows of a run's table ``walkers`` that are steady, on the axis and whose beads stay together.
+    """Rows of the table ``walkers`` of a run whose walkers count.
 
-    Symmetric dimers, which do not walk and turn across the axis, need only stay together.
+    They are steady, end close to the axis, and their beads stay together. Symmetric dimers, which
+    do not walk and turn across the axis, need only stay together.
     """
     walkers = results.table("walkers")
-    kept = keeps_beads_together(walkers)
+    counts = keeps_beads_together(walkers)
     if results.get("sin_delta") != 0.0:
-        kept &= walkers["steady"] & (walkers["orientation_end"].abs() < ASTRAY)
-    return walkers.loc[kept]
+        on_axis = walkers["orientation_end"].abs() < LARGEST_ANGLE_ON_AXIS
+        counts &= walkers["steady"] & on_axis
+    return walkers.loc[counts]

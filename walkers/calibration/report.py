@@ -1,4 +1,7 @@
-"""Tables and figures of a calibration: facts beside the engine's numbers, and what is known of the parameters."""
+"""Tables and figures of a calibration: facts beside the engine's numbers, and the posterior.
+
+The calibration itself is made in `walkers.calibration.calibrate`.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ import numpy as np
 from walkers.arrays import FloatArray
 from walkers.calibration.calibrate import PROPOSED, Outcome
 from walkers.calibration.file import Calibration
+from walkers.calibration.observations import Observation
 from walkers.files import write_bytes, write_json
 from walkers.inputs.keys import flatten
 from walkers.inputs.toml import toml_bytes
@@ -24,160 +28,231 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 CALIBRATION_NAME = "calibration.json"
-_ENDS = (0.05, 0.5, 0.95)
+"""Name of the record of a calibration."""
+_INTERVAL = (0.05, 0.5, 0.95)
+"""Quantiles of parameters that are reported."""
+_MARKERS = "os^DvPX*"
+"""Markers of the sets in figures, which are repeated."""
 
 
 def write_outcome(outcome: Outcome, to: Path) -> list[Path]:
-    """Write posterior (samples of equal weight, columns in the units of the parameters), record, table, case, figure.
+    """Write the files of a calibration.
 
-    The case ``best.toml`` is that of the first experiment at the highest posterior.
+    Parameters
+    ----------
+    outcome
+        The outcome.
+    to
+        The folder, which is made if necessary.
+
+    Returns
+    -------
+    list of Path
+        ``posterior.parquet``, samples of equal weight, whose columns are the parameters in their
+        units; ``calibration.json``, the record; ``calibration.md``, its tables; ``best.toml``, the
+        case of `best_case` at the highest posterior; and the figure ``predictions.png`` with what
+        belongs to it.
     """
     import pandas as pd
 
     to.mkdir(parents=True, exist_ok=True)
-    record, calibration = calibration_record(outcome), outcome.calibration
-    samples = pd.DataFrame(
-        calibration.values(outcome.posterior.samples), columns=[*calibration.file.parameters]
-    )
-    files = [
-        to / file for file in ("posterior.parquet", CALIBRATION_NAME, "calibration.md", "best.toml")
-    ]
-    write_bytes(files[0], samples.to_parquet(index=False))
-    write_json(files[1], record)
-    write_bytes(files[3], toml_bytes(best_case(calibration, outcome.sets[PROPOSED[0]], samples)))
-    write_bytes(
-        files[2], rendered("walkers.calibration", "report.md.j2", {"found": record}).encode()
-    )
+    calibration = outcome.calibration
+    record = calibration_record(outcome)
+    values = calibration.values(outcome.posterior.samples)
+    samples = pd.DataFrame(values, columns=list(calibration.file.parameters))
+    best = best_case(calibration, outcome.sets[PROPOSED[0]], samples)
+    report = rendered("walkers.calibration", "report.md.j2", found=record)
+    posterior_path = to / "posterior.parquet"
+    record_path = to / CALIBRATION_NAME
+    report_path = to / "calibration.md"
+    best_path = to / "best.toml"
+    write_bytes(posterior_path, samples.to_parquet(index=False))
+    write_json(record_path, record)
+    write_bytes(best_path, toml_bytes(best))
+    write_bytes(report_path, report.encode())
     sources = [f"{calibration.name}-{part}" for part in ("named", "round", "proposed")]
-    return files + save_figure(
-        draw_facts(outcome), to / "predictions.png", sources, title=record["title"]
-    )
+    figure = draw_facts(outcome)
+    pictures = save_figure(figure, to / "predictions.png", sources, title=record["title"])
+    return [posterior_path, record_path, report_path, best_path, *pictures]
 
 
 def best_case(calibration: Calibration, best: FloatArray, samples: pd.DataFrame) -> dict[str, Any]:
-    """Tables of the case of the first experiment at a point (D,), each value uncertain within 5 to 95 % of samples."""
-    parameters, first = calibration.file.parameters, next(iter(calibration.experiments))
-    values = dict(zip(parameters, map(_short, calibration.values(best[None])[0]), strict=True))
-    tables = calibration.case(np.array([*values.values()]))
+    """Tables of the case of the first experiment at a parameter set.
+
+    Parameters
+    ----------
+    calibration
+        The calibration.
+    best : ndarray, shape (D,)
+        The set, a point of the unit cube of the prior.
+    samples
+        Samples of the posterior, with a column of values for each parameter.
+
+    Returns
+    -------
+    dict
+        The tables of a case file. ``uncertain`` has the range from 5 to 95 % of the samples for the
+        keys of each parameter, and includes the value.
+    """
+    first = next(iter(calibration.experiments))
+    parameters = calibration.file.parameters
+    values = [_rounded(value) for value in calibration.values(best[None])[0]]
+    tables = calibration.case(np.array(values))
     ranges = flatten(tables.get("uncertain", {}))
-    for name, parameter in parameters.items():
-        low, high = map(_short, samples[name].quantile(_ENDS[::2]))
-        ends = [min(low, values[name]), max(high, values[name])]
-        if ends[0] < ends[1] and first in (parameter.experiments or [first]):
-            written = [parameter.written(end) for end in ends]
-            ranges |= dict.fromkeys(
-                parameter.keys, {"loguniform": written} if parameter.log else written
-            )
+    for (name, parameter), value in zip(parameters.items(), values, strict=True):
+        low = min(_rounded(samples[name].quantile(_INTERVAL[0])), value)
+        high = max(_rounded(samples[name].quantile(_INTERVAL[2])), value)
+        if low >= high or not parameter.acts_in(first):
+            continue
+        limits = [parameter.written(low), parameter.written(high)]
+        for key in parameter.keys:
+            ranges[key] = {"loguniform": limits} if parameter.log else limits
     return {**tables, "uncertain": ranges}
 
 
-def _short(value: float) -> float:
-    return float(f"{value:.4g}")  # more digits than the facts determine
+def _rounded(value: float) -> float:
+    """A value with four digits; the facts do not determine more."""
+    return float(f"{value:.4g}")
 
 
 def calibration_record(outcome: Outcome) -> dict[str, Any]:
-    """Contents of ``calibration.json``; observations in mm/s and degrees."""
-    calibration, parameters = outcome.calibration, outcome.calibration.file.parameters
-    samples = dict(zip(parameters, calibration.values(outcome.posterior.samples).T, strict=True))
-    prior = {
-        name: parameter.values(np.array(_ENDS)).tolist() for name, parameter in parameters.items()
-    }
-    # Parameters that set the same keys in different experiments: where a ratio of 1 is likely, one value would do.
-    alike = [
-        two
-        for two in combinations(parameters, 2)
-        if parameters[two[0]].keys == parameters[two[1]].keys
-    ]
-    samples |= {f"{second}/{first}": samples[second] / samples[first] for first, second in alike}
-    rows = [_row(outcome, place) for place in range(len(calibration.file.observations))]
-    values = calibration.values(np.stack([*outcome.sets.values()])).tolist()
+    """The contents of ``calibration.json``.
+
+    Observations are in mm/s and degrees, parameters in their units. ``posterior`` and ``prior``
+    have 5 %, median and 95 % of each parameter. ``posterior`` also has ratios of parameters, such
+    as ``second/first``, that set the same keys in different experiments: where a ratio of 1 is
+    likely, one value would do.
+    """
+    calibration = outcome.calibration
+    file = calibration.file
+    parameters = file.parameters
+    interval = np.array(_INTERVAL)
+    rows = [_observation_row(outcome, number) for number in range(len(file.observations))]
+    independent_rows = [row for row in rows if not row["derived"]]
+    agree = {}
+    for name in outcome.sets:
+        agree[name] = sum(row["agrees"][name] for row in independent_rows)
+    posterior = {}
+    for name, samples in _posterior_samples(outcome).items():
+        posterior[name] = np.quantile(samples, interval).tolist()
+    prior = {}
+    labels = {}
+    for name, parameter in parameters.items():
+        prior[name] = parameter.values(interval).tolist()
+        labels[name] = parameter.label or name
+    values_of_sets = calibration.values(np.stack(list(outcome.sets.values()))).tolist()
+    sets = {}
+    for name, values in zip(outcome.sets, values_of_sets, strict=True):
+        sets[name] = dict(zip(parameters, values, strict=True))
     return {
         "calibration": calibration.name,
-        "title": calibration.file.title,
-        "observed": "published" if calibration.file.published else "measured",
-        "settings": calibration.file.model_dump(mode="json"),
-        "labels": {name: parameter.label or name for name, parameter in parameters.items()},
+        "title": file.title,
+        "observed": "published" if file.published else "measured",
+        "settings": file.model_dump(mode="json"),
+        "labels": labels,
         "number": outcome.number,
-        "sets": {
-            name: dict(zip(parameters, row, strict=True))
-            for name, row in zip(outcome.sets, values, strict=True)
-        },
-        "agree": {
-            name: sum(row["agrees"][name] for row in rows if not row["derived"])
-            for name in outcome.sets
-        },
-        "of": sum(not row["derived"] for row in rows),
-        "posterior": {
-            name: [float(end) for end in np.quantile(column, _ENDS)]
-            for name, column in samples.items()
-        },
+        "sets": sets,
+        "agree": agree,
+        "of": len(independent_rows),
+        "posterior": posterior,
         "prior": prior,
         "effective_samples": [
-            posterior.effective_samples for posterior in (outcome.posterior, outcome.held_out)
+            outcome.posterior.effective_samples,
+            outcome.held_out.effective_samples,
         ],
         "observations": rows,
     }
 
 
-def calibration_summary(record: Mapping[str, Any]) -> str:
-    """The facts that agree at each set, and the interval of each parameter, from `calibration_record`."""
-    agree = [
-        [name, f"{count} of {record['of']} {record['observed']} facts agree within their deviation"]
-        for name, count in record["agree"].items()
-    ]
-    intervals = [
-        [record["labels"].get(name, name), "{1:.3g} ({0:.3g} to {2:.3g})".format(*ends)]
-        for name, ends in record["posterior"].items()
-    ]
-    note = "posterior: median, in brackets 5 to 95 %"
-    if 2 * max(record["agree"].values()) < record["of"]:
-        doubt = "the model, or a fact, is in question, and the intervals say little"
-        note += f"; no set agrees with half of the facts: {doubt}"
-    return "\n\n".join([aligned(agree), aligned(intervals), note])
+def _posterior_samples(outcome: Outcome) -> dict[str, FloatArray]:
+    """Samples of each parameter, and of ratios of parameters that set the same keys."""
+    calibration = outcome.calibration
+    parameters = calibration.file.parameters
+    values = calibration.values(outcome.posterior.samples)
+    samples: dict[str, FloatArray] = dict(zip(parameters, values.T, strict=True))
+    for first, second in combinations(parameters, 2):
+        if parameters[first].keys == parameters[second].keys:
+            samples[f"{second}/{first}"] = samples[second] / samples[first]
+    return samples
 
 
-def _row(outcome: Outcome, place: int) -> dict[str, Any]:
-    """A fact, its number at the sets, and its prediction if it was held out."""
-    observation = outcome.calibration.file.observations[place]
-    (unit, scale), numbers = (
-        observation.unit,
-        {name: float(row[place]) for name, row in outcome.numbers.items()},
-    )
-    ends, emulator = outcome.predicted(observation), outcome.emulators.get(observation.name)
+def _observation_row(outcome: Outcome, number: int) -> dict[str, Any]:
+    """An observation, its number at each set, and its prediction if it was held out."""
+    observation = outcome.calibration.file.observations[number]
+    unit, scale = observation.unit
+    numbers: dict[str, float | None] = {}
+    agrees = {}
+    for name, numbers_of_set in outcome.numbers.items():
+        value = float(numbers_of_set[number])
+        numbers[name] = value * scale if isfinite(value) else None
+        agrees[name] = observation.agrees(value)
+    emulator = outcome.emulators.get(observation.name)
+    predicted = outcome.predicted(observation)
     return {
-        **{name: getattr(observation, name) for name in ("name", "group", "title", "derived")},
+        "name": observation.name,
+        "group": observation.group,
+        "title": observation.title,
+        "derived": observation.derived,
         "expected": observation.text,
         "unit": unit,
-        "numbers": {
-            name: number * scale if isfinite(number) else None for name, number in numbers.items()
-        },
-        "agrees": {name: observation.agrees(number) for name, number in numbers.items()},
-        "emulator_error": emulator and emulator.error,
-        "predicted": None if ends is None else (ends * scale).tolist(),
+        "numbers": numbers,
+        "agrees": agrees,
+        "emulator_error": None if emulator is None else emulator.error,
+        "predicted": None if predicted is None else (predicted * scale).tolist(),
     }
+
+
+def calibration_summary(record: Mapping[str, Any]) -> str:
+    """How many facts agree at each set, and the interval of each parameter, as text.
+
+    ``record`` is that of `calibration_record`.
+    """
+    agreement = []
+    for name, count in record["agree"].items():
+        text = f"{count} of {record['of']} {record['observed']} facts agree within their deviation"
+        agreement.append([name, text])
+    intervals = []
+    for name, (low, median, high) in record["posterior"].items():
+        label = record["labels"].get(name, name)
+        intervals.append([label, f"{median:.3g} ({low:.3g} to {high:.3g})"])
+    note = "posterior: median, in brackets 5 to 95 %"
+    if 2 * max(record["agree"].values()) < record["of"]:
+        note += (
+            "; no set agrees with half of the facts: the model, or a fact, is in question, "
+            "and the intervals say little"
+        )
+    return "\n\n".join([aligned(agreement), aligned(intervals), note])
 
 
 @styled
 def draw_facts(outcome: Outcome) -> Figure:
-    """Distances from the facts in deviations: of the sets, and predicted for what is held out."""
+    """Distances of numbers from the facts, in deviations.
+
+    Markers are the numbers of the engine at each set; a line is the prediction of a fact that was
+    held out, from 5 to 95 %.
+    """
     facts = outcome.calibration.file.observations
     figure, axes = new_figure(TWO_COLUMNS, 0.25 * len(facts) + 1.5)
-    places = np.arange(len(facts))[::-1]
+    heights = np.arange(len(facts))[::-1]
     axes.axvspan(-1.0, 1.0, color="0.9", lw=0)
-    for (name, numbers), marker in zip(
-        outcome.numbers.items(), "os^DvPX*" * len(outcome.sets), strict=False
-    ):
-        away = [fact.residual(number) for fact, number in zip(facts, numbers, strict=True)]
-        axes.plot(away, places, marker, ms=4, mfc="none", ls="none", label=name)
-    for fact, place in zip(facts, places, strict=True):
-        if (ends := outcome.predicted(fact)) is not None:
-            axes.hlines(
-                place - 0.25, fact.residual(ends[0]), fact.residual(ends[2]), color="k", lw=1.0
-            )
-    axes.set_yticks(places, [fact.title for fact in facts], fontsize=7)
-    axes.set(
-        xlabel="distance from the fact/deviation (lines: predicted)", ylim=(-0.8, len(facts) - 0.2)
-    )
+    for index, (name, numbers) in enumerate(outcome.numbers.items()):
+        marker = _MARKERS[index % len(_MARKERS)]
+        distances = _residuals(facts, numbers)
+        axes.plot(distances, heights, marker, ms=4, mfc="none", ls="none", label=name)
+    for fact, height in zip(facts, heights, strict=True):
+        predicted = outcome.predicted(fact)
+        if predicted is not None:
+            low = fact.residual(predicted[0])
+            high = fact.residual(predicted[2])
+            axes.hlines(height - 0.25, low, high, color="k", lw=1.0)
+    axes.set_yticks(heights, [fact.title for fact in facts], fontsize=7)
+    axes.set_xlabel("distance from the fact/deviation (lines: predicted)")
+    axes.set_ylim(-0.8, len(facts) - 0.2)
     axes.set_xscale("symlog", linthresh=3.0)
     figure.legend(loc="outside upper center", ncols=2)
     return figure
+
+
+def _residuals(facts: list[Observation], numbers: FloatArray) -> list[float]:
+    """Distances of the numbers of a set, shape (K,), from K facts in deviations."""
+    return [fact.residual(number) for fact, number in zip(facts, numbers, strict=True)]
