@@ -43,14 +43,13 @@ from walkers.second_engine.crosscheck import cross_check, full_cases, simulate, 
 from walkers.second_engine.engine import TERMS, SecondEngine
 from walkers.second_engine.lines import Line, Verdict, failures, lines_text
 from walkers.second_engine.scenes import (
-    DEEP,
     DRY,
-    FLOOR,
+    OVERLAP,
     Bench,
+    bead_at_plane,
     bench_case,
     full_case,
     liquid_lines,
-    over,
     pair,
     prescribed,
     scene_of,
@@ -131,7 +130,7 @@ def test_a_bead_rolls_to_rest_and_swings_in_a_cylinder() -> None:
 def test_bridges_are_the_law_between_its_knots() -> None:
     """Pull and resistances, at gaps that are none of the splines', to 1e-8."""
     case = full_case({})
-    bridges = second_engine(case, scene_of([over(FLOOR, 0.0, RADIUS)])).constants.bridges
+    bridges = second_engine(case, scene_of([bead_at_plane(BOTTOM, 0.0, RADIUS)])).constants.bridges
     surfaces = Surfaces.between(RADIUS, inf, case.liquid.of_bridges, case.contact.roughness)
     curve = by_name(case.liquid.law)(surfaces)
     for gap in np.linspace(0.0, 0.999 * curve.rupture, 777):
@@ -143,7 +142,7 @@ def test_bridges_are_the_law_between_its_knots() -> None:
 
 def test_the_forces_of_a_pair_conserve_momentum_and_angular_momentum() -> None:
     """With friction, rolling friction, and all resistances of a bridge."""
-    engine = second_engine(full_case({}), scene_of(pair(-DEEP, 0.043, (0.02, -0.011, 0.005))))
+    engine = second_engine(full_case({}), scene_of(pair(-OVERLAP, 0.043, (0.02, -0.011, 0.005))))
     for _ in range(300):
         engine.run(1, 1)
         force, torque, places = engine.state.force, engine.state.torque, engine.state.position
@@ -234,7 +233,7 @@ def test_walls_are_as_far_as_the_boundary_says(bench: Bench) -> None:
     leaning, hollow = Flat((1e-4, 2e-4, -3e-4), (0.48, -0.36, 0.8), "leaning"), Round(2.5e-3)
     turn, out = 2.0, 2.5e-3 - RADIUS + 1e-6
     beads = [
-        over(leaning, -1e-6, RADIUS),
+        bead_at_plane(leaning, -1e-6, RADIUS),
         Bead(0, (out * cos(turn), out * sin(turn), 4e-3), RADIUS),
     ]
     rows, places = _rows(bench, prescribed(bench_case({}), scene_of(beads, [leaning, hollow]), 3))
@@ -258,7 +257,10 @@ def test_a_wall_that_moves_meets_beads_that_do_not(bench: Bench) -> None:
     }
     peak = {"drive.peak_acceleration": f"{1e-3 * (2.0 * pi * 80.0) ** 2!r} m/s^2"}
     case = bench_case({**DRY, **up, **peak})
-    beads = [over(FLOOR, 1e-3 - 1e-6, RADIUS), over(FLOOR, 1e-3 + 1e-6, RADIUS, x=1e-3)]
+    beads = [
+        bead_at_plane(BOTTOM, 1e-3 - 1e-6, RADIUS),
+        bead_at_plane(BOTTOM, 1e-3 + 1e-6, RADIUS, x=1e-3),
+    ]
     (row,), _ = _rows(bench, prescribed(case, scene_of(beads), case.run.steps_per_cycle // 4))
     told = dict(zip(WALL_BRIDGES, row.tolist(), strict=True))
     assert (told["id"], told["overlap"]) == pytest.approx((1, 1e-6), rel=1e-5)
@@ -278,7 +280,7 @@ REFUSED_WALLS = {
 
 @pytest.mark.parametrize("command", REFUSED_WALLS)
 def test_commands_that_are_refused(bench: Bench, command: str) -> None:
-    deck = compose(prescribed(bench_case({}), scene_of([over(FLOOR, 0.0, RADIUS)]), 3))
+    deck = compose(prescribed(bench_case({}), scene_of([bead_at_plane(BOTTOM, 0.0, RADIUS)]), 3))
     lines = deck.text.replace("&\n", " ").splitlines()
     changed = [
         f"fix walls all wall/bridge {command}" if "wall/bridge" in line else line for line in lines
@@ -292,7 +294,9 @@ def test_a_dry_contact_with_a_wall_begins_without_friction(bench: Bench) -> None
     case = bench_case({"liquid.law": "willett", "contact.friction.bead_wall": 0.3}).with_value_at(
         "liquid.conserved", True
     )
-    deck = compose(prescribed(case, scene_of([over(FLOOR, -1e-6, RADIUS, spin=STILL)]), 60))
+    deck = compose(
+        prescribed(case, scene_of([bead_at_plane(BOTTOM, -1e-6, RADIUS, spin=STILL)]), 60)
+    )
     empty = deck.text.replace("scalar yes yes no 1.0", "scalar yes yes no 0.0")
     before, _, after = empty.partition("\nrun ")
     ways = ("1e-2 0 0", "0 0 2.0", "0 0 -2.0")  # m/s, each for 20 steps

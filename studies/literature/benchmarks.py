@@ -18,10 +18,11 @@ import numpy as np
 
 from walkers.arrays import FloatArray
 from walkers.inputs.tables.materials import Friction, Roughness
+from walkers.inputs.tables.shapes.walls import BOTTOM
 from walkers.physics.contact import Impact, reduced_modulus
 from walkers.second_engine.engine import SecondEngine
 from walkers.second_engine.lines import Line
-from walkers.second_engine.scenes import DRY, FLOOR, bench_case
+from walkers.second_engine.scenes import DRY, bench_case
 
 READING, STEP, SLIDING = 0.02, 2e-3, 4e-3
 """Tolerances: a point of a printed figure, over its axis; forces and durations at a thousand steps a contact; sliding,
@@ -112,7 +113,7 @@ class Benchmark:
             roughness=Roughness(bead_bead=0.01 * radius, bead_wall=0.01 * radius),
         )
         engine = SecondEngine(
-            case.with_values(contact=contact), np.full(len(start), radius), start, walls=[FLOOR]
+            case.with_values(contact=contact), np.full(len(start), radius), start, walls=[BOTTOM]
         )
         every = 1 if count == 1 else steps
         return engine.run(steps, every)[:, :count]

@@ -24,7 +24,7 @@ from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.loads import bridge_at_rest, contact_loads, resistances_at_rest
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import Harmonic
-from walkers.inputs.tables.shapes.walls import Flat, Wall
+from walkers.inputs.tables.shapes.walls import BOTTOM, Flat, Wall
 from walkers.physics.bridge import Curve, Surfaces
 from walkers.physics.capillary import bead_volume
 from walkers.physics.contact import Impact, reduced_modulus
@@ -32,13 +32,12 @@ from walkers.physics.laws import young_laplace
 from walkers.runner.binary import find_engine
 from walkers.second_engine.lines import Line
 from walkers.second_engine.scenes import (
+    AT_REST,
     DRY,
-    FLOOR,
-    STILL,
+    LARGE_RADIUS,
     Bench,
-    R,
+    bead_at_plane,
     bench_case,
-    over,
     recorded_plan,
 )
 from walkers.templates.placement import Bead, PlacedBodies, loading_of, surface_of
@@ -111,7 +110,7 @@ def followed(
     beads: Sequence[Bead],
     steps: int,
     every: int,
-    walls: Sequence[Wall] = (FLOOR,),
+    walls: Sequence[Wall] = (BOTTOM,),
 ) -> FloatArray:
     """Frames of beads, each with its own case, 8 mm apart along y; shape (steps // every + 1, beads, 9)."""
     kinds = list(dict.fromkeys(map(surface_of, cases)))
@@ -129,9 +128,18 @@ def followed(
 def thrown(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
     """A dry bead that is thrown sliding rolls at 5/7 of its speed after 2v/7μg."""
     case, ends = bench_case(_DRY), speed / SLOWS
-    bead = over(FLOOR, -contact_loads(case)[0].overlap, R, velocity=(speed, 0.0, 0.0), spin=STILL)
+    bead = bead_at_plane(
+        BOTTOM,
+        -contact_loads(case)[0].overlap,
+        LARGE_RADIUS,
+        velocity=(speed, 0.0, 0.0),
+        spin=AT_REST,
+    )
     frames = followed(bench, [case], [bead], 10 * round(0.15 * ends / case.run.time_step), 10)[:, 0]
-    slip, time = frames[:, 3] - R * frames[:, 7], 10.0 * case.run.time_step * np.arange(len(frames))
+    slip, time = (
+        frames[:, 3] - LARGE_RADIUS * frames[:, 7],
+        10.0 * case.run.time_step * np.arange(len(frames)),
+    )
     slope, start = np.polyfit(time[slip > 0.05 * speed], slip[slip > 0.05 * speed], 1)
     yield Line(
         "thrown bead: speed of rolling over speed of the throw",
@@ -193,20 +201,20 @@ def slider(bench: Bench, phase: float) -> FloatArray:
         cases.append(plain.with_value_at("drive.harmonics", tuple(sines)))
     moves, turns = (
         start + 2.0 / 7.0 * drift,
-        -5.0 / 7.0 * drift / R,
+        -5.0 / 7.0 * drift / LARGE_RADIUS,
     )  # so that the centre stays here
     beads = [
-        over(
-            FLOOR,
+        bead_at_plane(
+            BOTTOM,
             gap,
-            R,
+            LARGE_RADIUS,
             velocity=(moves * speed, 0.0, 0.0),
             spin=(0.0, turns * speed, 0.0),
         )
         for speed in speeds.tolist()
     ]
     frames = followed(bench, cases, beads, CYCLES * steps, 50)[1 + FIRST * steps // 50 :]
-    return np.asarray((frames[..., 3] - R * frames[..., 7]).mean(axis=0) / speeds)
+    return np.asarray((frames[..., 3] - LARGE_RADIUS * frames[..., 7]).mean(axis=0) / speeds)
 
 
 def two_tones(bench: Bench) -> Iterator[Line]:
@@ -263,7 +271,7 @@ def restitutions(
     ]
     high, far = 1.001 * FILM, 1.01 * bridge_at_rest(plain, GLASS, inf).rupture
     beads = [
-        over(FLOOR, high, GLASS, velocity=(0.0, 0.0, -speed), spin=STILL)
+        bead_at_plane(BOTTOM, high, GLASS, velocity=(0.0, 0.0, -speed), spin=AT_REST)
         for _ in OILS
         for speed in SPEEDS.tolist()
     ]
@@ -317,15 +325,15 @@ def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterato
     ceiling, load = Flat((0.0, 0.0, 0.02), (0.0, 0.0, -1.0), "ceiling"), contact_loads(plain)[0]
     held = load.pull / (bead_volume(radius) * plain.pressing_gravity)
     beads = [
-        over(wall, -load.overlap, radius, spin=STILL)
-        for wall in (FLOOR, FLOOR, ceiling, ceiling, ceiling)
+        bead_at_plane(wall, -load.overlap, radius, spin=AT_REST)
+        for wall in (BOTTOM, BOTTOM, ceiling, ceiling, ceiling)
     ]
     beads[3:] = [
         replace(bead, density=share * held)
         for bead, share in zip(beads[3:], (0.9, 1.1), strict=True)
     ]
     cases = oily, oily.with_value_at("contact.friction.bead_wall", FRICTION), oily, thin, thin
-    last = followed(bench, cases, beads, 300_000, 3000, (FLOOR, ceiling))[-1]
+    last = followed(bench, cases, beads, 300_000, 3000, (BOTTOM, ceiling))[-1]
     rolls, gaps = np.abs(radius * last[:, 7] / last[:, 3]), 0.02 - radius - last[:, 2]
     sliding, coupling, rolling = resistances_at_rest(oily, radius, inf)
     free = (radius * sliding + coupling) / (

@@ -53,15 +53,13 @@ EQUAL_DECKS = 1e-9
 """Largest relative difference that passes between two decks that compute the same."""
 DRY = {"liquid.law": f"{__file__}:dry"}
 """Changes of a case without bridges."""
-FLOOR = BOTTOM
-"""The horizontal plane z = 0, with beads above it."""
-R = 3e-4
+LARGE_RADIUS = 3e-4
 """Radius of large beads, m."""
-S = 2e-4
+SMALL_RADIUS = 2e-4
 """Radius of small beads, m."""
-DEEP = 1.7123e-6
+OVERLAP = 1.7123e-6
 """Overlap of touching beads, m."""
-STILL: Vector = (0.0, 0.0, 0.0)
+AT_REST: Vector = (0.0, 0.0, 0.0)
 """Velocity (m/s) or spin (rad/s) of a bead that does not move or turn."""
 SPIN: Vector = (61.0, -83.0, 47.0)
 """Spin of most beads, rad/s."""
@@ -156,12 +154,12 @@ def full_case(changes: Mapping[str, Any]) -> Case:
 # --- beads ----------------------------------------------------------------------------------------
 
 
-def over(  # noqa: PLR0913 (the three after the star have a name in each call)
+def bead_at_plane(  # noqa: PLR0913 (the three after the star have a name in each call)
     wall: Flat,
     gap: float,
     radius: float,
     *,
-    velocity: Vector = STILL,
+    velocity: Vector = AT_REST,
     spin: Vector = SPIN,
     x: float = 0.0,
 ) -> Bead:
@@ -211,7 +209,7 @@ def bead_in_cylinder(
     x = cos(azimuth)
     y = sin(azimuth)
     radial, azimuthal, axial = velocity
-    centre = (distance * x, distance * y, 10.0 * azimuth * R)
+    centre = (distance * x, distance * y, 10.0 * azimuth * LARGE_RADIUS)
     cartesian = (radial * x - azimuthal * y, radial * y + azimuthal * x, axial)
     return Bead(0, centre, radius, cartesian, SPIN)
 
@@ -237,15 +235,15 @@ def pair(
     """
     normal = np.array([0.48, 0.6, 0.64])
     first = np.array([-3e-3, 1e-3, 4e-3])
-    second = first + (R + S + gap) * normal
+    second = first + (LARGE_RADIUS + SMALL_RADIUS + gap) * normal
     velocity = separation_velocity * normal + np.array(common_velocity)
     return [
-        Bead(0, _vector(first), R, spin=spins[0]),
-        Bead(0, _vector(second), S, _vector(velocity), spins[1]),
+        Bead(0, _vector(first), LARGE_RADIUS, spin=spins[0]),
+        Bead(0, _vector(second), SMALL_RADIUS, _vector(velocity), spins[1]),
     ]
 
 
-def moved(beads: Sequence[Bead], x: float, y: float, speed: float = 0.0) -> list[Bead]:
+def shifted_beads(beads: Sequence[Bead], x: float, y: float, speed: float = 0.0) -> list[Bead]:
     """Beads that are shifted by x and y (m), with an additional velocity along x (m/s)."""
     shifted = []
     for bead in beads:
@@ -260,7 +258,7 @@ def _vector(components: FloatArray) -> Vector:
     return (x, y, z)
 
 
-def scene_of(beads: Sequence[Bead], walls: Sequence[Wall] = (FLOOR,)) -> PlacedBodies:
+def scene_of(beads: Sequence[Bead], walls: Sequence[Wall] = (BOTTOM,)) -> PlacedBodies:
     """A scene of beads between walls in a box of 2 cm around the origin."""
     numbered = tuple(replace(bead, id=number) for number, bead in enumerate(beads, 1))
     lower = (-0.01, -0.01, -0.01)
@@ -404,14 +402,14 @@ class Bench:
             raise Stopped("the audit was stopped")
 
 
-def farthest(measured: FloatArray, expected: FloatArray) -> float:
+def relative_error(measured: FloatArray, expected: FloatArray) -> float:
     """The largest difference of two arrays of vectors, over the largest expected vector."""
     scale = np.linalg.norm(expected, axis=-1).max()
     difference = np.linalg.norm(measured - expected, axis=-1).max()
     return float(difference / (scale or 1.0))
 
 
-def in_walls(case: Case, output: SceneOutput) -> FloatArray:
+def in_frame_of_walls(case: Case, output: SceneOutput) -> FloatArray:
     """Frames after the first in the frame of the walls, as the forces of these frames need them.
 
     Velocities of beads and walls are those of half a step before.
@@ -447,7 +445,7 @@ class Setting:
     """
 
     beads: Sequence[Bead]
-    walls: Sequence[Wall] = (FLOOR,)
+    walls: Sequence[Wall] = (BOTTOM,)
     changes: Mapping[str, Any] = field(default_factory=dict)
     freely: int = 0
 
@@ -470,8 +468,8 @@ class Setting:
         expected = output.frames[1:]
         frames = second_engine(case, scene).run(self.freely, sample_every)
         return {
-            "displacement": farthest(expected[:, :, :3] - start, frames[..., :3] - start),
-            "spin": farthest(expected[:, :, 6:], frames[..., 6:]),
+            "displacement": relative_error(expected[:, :, :3] - start, frames[..., :3] - start),
+            "spin": relative_error(expected[:, :, 6:], frames[..., 6:]),
         }
 
 
@@ -479,10 +477,10 @@ def _errors_of_forces(case: Case, scene: PlacedBodies, bench: Bench) -> dict[str
     """Relative errors of forces and torques on beads with a prescribed motion."""
     engine = second_engine(case, scene)
     output = bench.run(prescribed(case, scene))
-    forces = np.array([engine.follow(frame) for frame in in_walls(case, output)])
+    forces = np.array([engine.follow(frame) for frame in in_frame_of_walls(case, output)])
     return {
-        "force": farthest(output.forces[1:, :, :3], forces[..., :3]),
-        "torque": farthest(output.forces[1:, :, 3:], forces[..., 3:]),
+        "force": relative_error(output.forces[1:, :, :3], forces[..., :3]),
+        "torque": relative_error(output.forces[1:, :, 3:], forces[..., 3:]),
     }
 
 
@@ -491,14 +489,26 @@ def _errors_of_forces(case: Case, scene: PlacedBodies, bench: Bench) -> dict[str
 _LEANING_WALL = Flat((1e-4, 2e-4, -3e-4), (0.48, -0.36, 0.8), "leaning")
 _SIDE_WALL = Flat((0.0, 6.0e-4, 1e-3), (0.0, -1.0, 0.0), "+y")
 _ROUND_WALL = Round(2.5e-3)
-_ROLLING_SPIN: Vector = (0.0, 0.03 / R, 0.0)
+_ROLLING_SPIN: Vector = (0.0, 0.03 / LARGE_RADIUS, 0.0)
 """Spin of a large bead that rolls along x at 3 cm/s, rad/s."""
-_LEAVING_BEAD = over(FLOOR, -DEEP, R, velocity=_UPWARD)
-_PARTING_PAIR = pair(-DEEP, 0.043, (0.02, -0.011, 0.005))
+_LEAVING_BEAD = bead_at_plane(BOTTOM, -OVERLAP, LARGE_RADIUS, velocity=_UPWARD)
+_PARTING_PAIR = pair(-OVERLAP, 0.043, (0.02, -0.011, 0.005))
 CLIMBING = [
-    Bead(0, (0.0, 0.0, R - DEEP), R, (0.01, 0.02, 0.0), (5.0, 9.0, 40.0)),
-    Bead(0, (R + S - DEEP, 0.0, S + 1e-4), S, (0.01, 0.03, -0.04), SPIN),
-    Bead(0, (0.0, R + R - DEEP, R - DEEP), R, (0.0113, 0.0447, 0.0511), (3.0, -80.0, 5.0)),
+    Bead(0, (0.0, 0.0, LARGE_RADIUS - OVERLAP), LARGE_RADIUS, (0.01, 0.02, 0.0), (5.0, 9.0, 40.0)),
+    Bead(
+        0,
+        (LARGE_RADIUS + SMALL_RADIUS - OVERLAP, 0.0, SMALL_RADIUS + 1e-4),
+        SMALL_RADIUS,
+        (0.01, 0.03, -0.04),
+        SPIN,
+    ),
+    Bead(
+        0,
+        (0.0, LARGE_RADIUS + LARGE_RADIUS - OVERLAP, LARGE_RADIUS - OVERLAP),
+        LARGE_RADIUS,
+        (0.0113, 0.0447, 0.0511),
+        (3.0, -80.0, 5.0),
+    ),
 ]
 """Three beads: two touch the floor and each other, one touches the first bead above the floor."""
 
@@ -506,63 +516,90 @@ SCENES: dict[str, Setting] = {
     "beads on the floor leave, approach, slide, roll, and spin in place": Setting(
         [
             _LEAVING_BEAD,
-            over(FLOOR, 2e-5, S, velocity=_UPWARD, x=2e-3),
-            over(FLOOR, 9e-5, R, velocity=(0.031, 0.023, -0.053), x=4e-3),
-            over(FLOOR, -DEEP, R, velocity=(0.02, 0.013, 0.0), spin=STILL, x=6e-3),
-            over(FLOOR, -DEEP, R, velocity=(0.03, 0.0, 0.0), spin=_ROLLING_SPIN, x=8e-3),
-            over(FLOOR, -DEEP, R, x=-2e-3),
-            over(FLOOR, 2e-6, S, x=-4e-3),
+            bead_at_plane(BOTTOM, 2e-5, SMALL_RADIUS, velocity=_UPWARD, x=2e-3),
+            bead_at_plane(BOTTOM, 9e-5, LARGE_RADIUS, velocity=(0.031, 0.023, -0.053), x=4e-3),
+            bead_at_plane(
+                BOTTOM, -OVERLAP, LARGE_RADIUS, velocity=(0.02, 0.013, 0.0), spin=AT_REST, x=6e-3
+            ),
+            bead_at_plane(
+                BOTTOM,
+                -OVERLAP,
+                LARGE_RADIUS,
+                velocity=(0.03, 0.0, 0.0),
+                spin=_ROLLING_SPIN,
+                x=8e-3,
+            ),
+            bead_at_plane(BOTTOM, -OVERLAP, LARGE_RADIUS, x=-2e-3),
+            bead_at_plane(BOTTOM, 2e-6, SMALL_RADIUS, x=-4e-3),
         ]
     ),
     "a bead leaves a tilted wall": Setting(
-        [over(_LEANING_WALL, -DEEP, R, velocity=_UPWARD)], [_LEANING_WALL]
+        [bead_at_plane(_LEANING_WALL, -OVERLAP, LARGE_RADIUS, velocity=_UPWARD)], [_LEANING_WALL]
     ),
     "beads leave a cylindrical wall": Setting(
         [
-            bead_in_cylinder(_ROUND_WALL, -DEEP, R, 0.7, (-0.05, 0.03, 0.02)),
-            bead_in_cylinder(_ROUND_WALL, -DEEP, S, 3.0, (-0.05, 0.03, 0.02)),
+            bead_in_cylinder(_ROUND_WALL, -OVERLAP, LARGE_RADIUS, 0.7, (-0.05, 0.03, 0.02)),
+            bead_in_cylinder(_ROUND_WALL, -OVERLAP, SMALL_RADIUS, 3.0, (-0.05, 0.03, 0.02)),
         ],
         [_ROUND_WALL],
     ),
     "beads move along a cylindrical wall": Setting(
         [
-            bead_in_cylinder(_ROUND_WALL, -DEEP, R, 0.3, (-0.02, 0.3, 0.0)),
-            bead_in_cylinder(_ROUND_WALL, 1e-5, S, 2.0, (0.0, -0.4, 0.1)),
+            bead_in_cylinder(_ROUND_WALL, -OVERLAP, LARGE_RADIUS, 0.3, (-0.02, 0.3, 0.0)),
+            bead_in_cylinder(_ROUND_WALL, 1e-5, SMALL_RADIUS, 2.0, (0.0, -0.4, 0.1)),
         ],
-        [FLOOR, _ROUND_WALL],
+        [BOTTOM, _ROUND_WALL],
     ),
     "a bead in a corner": Setting(
-        [Bead(0, (1e-4, 6.0e-4 - R + DEEP, R - DEEP), R, (0.031, -0.043, 0.037), SPIN)],
-        [FLOOR, _SIDE_WALL],
+        [
+            Bead(
+                0,
+                (1e-4, 6.0e-4 - LARGE_RADIUS + OVERLAP, LARGE_RADIUS - OVERLAP),
+                LARGE_RADIUS,
+                (0.031, -0.043, 0.037),
+                SPIN,
+            )
+        ],
+        [BOTTOM, _SIDE_WALL],
     ),
     "pairs separate, of either order, approach, and roll on each other": Setting(
         [
             *_PARTING_PAIR,
-            *moved(_PARTING_PAIR[::-1], 3e-3, 0.0),
-            *moved(pair(4.1e-5, -0.023, (0.004, -0.003, 0.002)), 6e-3, 0.0),
-            *moved(pair(-DEEP, 0.0, STILL), 9e-3, 0.0),
+            *shifted_beads(_PARTING_PAIR[::-1], 3e-3, 0.0),
+            *shifted_beads(pair(4.1e-5, -0.023, (0.004, -0.003, 0.002)), 6e-3, 0.0),
+            *shifted_beads(pair(-OVERLAP, 0.0, AT_REST), 9e-3, 0.0),
         ]
     ),
     "three beads on the floor": Setting(CLIMBING),
     "the floor oscillates horizontally": Setting(
-        [over(FLOOR, -DEEP, R), over(FLOOR, -5e-7, S, spin=STILL, x=2e-3)],
+        [
+            bead_at_plane(BOTTOM, -OVERLAP, LARGE_RADIUS),
+            bead_at_plane(BOTTOM, -5e-7, SMALL_RADIUS, spin=AT_REST, x=2e-3),
+        ],
         changes=_FAST_DRIVE,
     ),
     "the floor oscillates vertically": Setting(
-        [over(FLOOR, -DEEP, R), over(FLOOR, 3e-6, S, spin=_ROLLING_SPIN, x=2e-3)],
+        [
+            bead_at_plane(BOTTOM, -OVERLAP, LARGE_RADIUS),
+            bead_at_plane(BOTTOM, 3e-6, SMALL_RADIUS, spin=_ROLLING_SPIN, x=2e-3),
+        ],
         changes={**_FAST_DRIVE, "drive.peak_acceleration": "25 g", "drive.axis": "z"},
     ),
     "weight and drive": Setting(
-        [over(FLOOR, -DEEP, R), Bead(0, (2e-3, 0.0, 5e-3), S)],
+        [bead_at_plane(BOTTOM, -OVERLAP, LARGE_RADIUS), Bead(0, (2e-3, 0.0, 5e-3), SMALL_RADIUS)],
         changes={**_FAST_DRIVE, "drive.frame": "container", "drive.axis": "z", **_WEIGHT},
     ),
     "thrown beads": Setting(
         [
-            over(FLOOR, 2e-5, R, velocity=(0.04, -0.03, -0.2), x=1e-3),
-            over(FLOOR, -1e-7, S, velocity=(0.05, 0.0, 0.0), spin=STILL, x=-1e-3),
-            over(FLOOR, -1e-7, R, velocity=(0.03, 0.0, 0.0), spin=_ROLLING_SPIN, x=3e-3),
+            bead_at_plane(BOTTOM, 2e-5, LARGE_RADIUS, velocity=(0.04, -0.03, -0.2), x=1e-3),
+            bead_at_plane(
+                BOTTOM, -1e-7, SMALL_RADIUS, velocity=(0.05, 0.0, 0.0), spin=AT_REST, x=-1e-3
+            ),
+            bead_at_plane(
+                BOTTOM, -1e-7, LARGE_RADIUS, velocity=(0.03, 0.0, 0.0), spin=_ROLLING_SPIN, x=3e-3
+            ),
             *pair(1e-5, -0.1, (0.01, -0.02, 0.0)),
-            Bead(0, (0.0, 0.0, 5e-3), R, (0.1, 0.2, 0.0), (1.0, 2.0, 3.0)),
+            Bead(0, (0.0, 0.0, 5e-3), LARGE_RADIUS, (0.1, 0.2, 0.0), (1.0, 2.0, 3.0)),
         ],
         changes={**_WEIGHT, "drive.peak_acceleration": "4 g"},
         freely=6000,
@@ -588,12 +625,15 @@ def scene_lines(bench: Bench) -> Iterator[Line]:
 
 def restart_lines(bench: Bench) -> Iterator[Line]:
     """Springs and open bridges continue from a restart file as in an uninterrupted run."""
-    leaving_bead = replace(over(FLOOR, -DEEP, S, velocity=_UPWARD), centre=(3e-3, 0.0, S - DEEP))
+    leaving_bead = replace(
+        bead_at_plane(BOTTOM, -OVERLAP, SMALL_RADIUS, velocity=_UPWARD),
+        centre=(3e-3, 0.0, SMALL_RADIUS - OVERLAP),
+    )
     beads = [
-        over(FLOOR, -DEEP, R, velocity=(0.002, 0.001, 0.0), spin=STILL),
-        *pair(-DEEP, 0.001, (0.001, -0.002, 0.001)),
+        bead_at_plane(BOTTOM, -OVERLAP, LARGE_RADIUS, velocity=(0.002, 0.001, 0.0), spin=AT_REST),
+        *pair(-OVERLAP, 0.001, (0.001, -0.002, 0.001)),
         leaving_bead,
-        *moved(pair(-DEEP, 0.04, STILL), 0.0, 3e-3),
+        *shifted_beads(pair(-OVERLAP, 0.04, AT_REST), 0.0, 3e-3),
     ]
     case = full_case({})
     scene = scene_of(beads)
@@ -615,23 +655,23 @@ def restart_lines(bench: Bench) -> Iterator[Line]:
     }
     for bead, contact in contact_of_bead.items():
         expected = uninterrupted.forces[501:, bead, :3]
-        error = farthest(continued.forces[1:, bead, :3], expected)
+        error = relative_error(continued.forces[1:, bead, :3], expected)
         yield Line(f"{contact}: with and without a restart", 0.0, error, EQUAL)
 
 
 def rank_lines(bench: Bench) -> Iterator[Line]:
     """A deck on two MPI ranks against the same deck on one."""
-    first, last = pair(-DEEP, 0.01, STILL)
+    first, last = pair(-OVERLAP, 0.01, AT_REST)
     # LIGGGHTS exchanges the beads of a pair that has crossed from one rank to the other.
     crossing = [
-        *moved([first, last], 2.6e-3, 0.0, 0.9),
-        *moved([last, first], 2.6e-3, 2e-3, 0.9),
+        *shifted_beads([first, last], 2.6e-3, 0.0, 0.9),
+        *shifted_beads([last, first], 2.6e-3, 2e-3, 0.9),
     ]
     plan = prescribed(full_case({}), scene_of([*CLIMBING, *crossing]), 1000)
     single = bench.run(plan).forces
     double = bench.run(replace(plan, ranks=2)).forces
-    force_error = farthest(double[..., :3], single[..., :3])
-    torque_error = farthest(double[..., 3:], single[..., 3:])
+    force_error = relative_error(double[..., :3], single[..., :3])
+    torque_error = relative_error(double[..., 3:], single[..., 3:])
     yield Line("forces: two MPI ranks and one", 0.0, force_error, EQUAL_DECKS)
     yield Line("torques: two MPI ranks and one", 0.0, torque_error, EQUAL_DECKS)
 
@@ -648,8 +688,8 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
         "contact.restitution": 0.5,
     }
     case = bench_case(changes)
-    surfaces = surfaces_of(case, S, R)
-    scene = scene_of(pair(-DEEP, 0.05, STILL, (STILL, STILL)))
+    surfaces = surfaces_of(case, SMALL_RADIUS, LARGE_RADIUS)
+    scene = scene_of(pair(-OVERLAP, 0.05, AT_REST, (AT_REST, AT_REST)))
     deck = compose(prescribed(case, scene))
     with_contact_model = bench.run(_with_fine_table(deck, case, surfaces))
     stock_deck = rendered(
@@ -662,7 +702,7 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
         closest=surfaces.roughness / surfaces.reduced_radius,
     )
     with_stock_model = bench.run(replace(deck, text=stock_deck))
-    error = farthest(with_contact_model.forces[..., :3], with_stock_model.forces[..., :3])
+    error = relative_error(with_contact_model.forces[..., :3], with_stock_model.forces[..., :3])
     quantity = "two beads separate: force, Debian's own bridge model"
     yield Line(quantity, 0.0, error, EQUAL_DECKS)
 
@@ -670,7 +710,7 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
 def _with_fine_table(deck: Deck, case: Case, surfaces: Surfaces) -> Deck:
     """A deck with a more accurate table of the bridge between a small and a large bead."""
     fine = tabulated(by_name(case.liquid.law), surfaces, tolerance=1e-10).text()
-    heading = f"1 1 {S!r} {R!r}"
+    heading = f"1 1 {SMALL_RADIUS!r} {LARGE_RADIUS!r}"
     tables = deck.files[BRIDGES_NAME].split("bridge ")
     for number, table in enumerate(tables):
         if table.startswith(heading):
@@ -728,7 +768,7 @@ def _flying_beads(count: int) -> list[Bead]:
     return beads
 
 
-def company_lines(bench: Bench) -> Iterator[Line]:
+def shared_deck_lines(bench: Bench) -> Iterator[Line]:
     """A walker in a shared deck against the same walker in a deck of its own; a repeated run."""
     # Rolling friction would amplify rounding.
     changes = {"dimers.replicates": 1, "contact.rolling_friction": 0.0}
@@ -744,7 +784,7 @@ def company_lines(bench: Bench) -> Iterator[Line]:
     displacement = alone.frames[..., :3] - alone.frames[0, :, :3]
     shared_displacement = shared.frames[..., :3] - shared.frames[0, :, :3]
     # The walker has the beads 0 and 1 of its own deck, and the beads 2 and 3 of the shared deck.
-    error = farthest(shared_displacement[:, 2:4], displacement[:, :2])
+    error = relative_error(shared_displacement[:, 2:4], displacement[:, :2])
     yield Line("displacement of a walker: shared deck and own deck", 0.0, error, EQUAL_DECKS)
     dump = (alone.directory / "beads.bin").read_bytes()
     repeated_dump = (repeated.directory / "beads.bin").read_bytes()
@@ -763,6 +803,6 @@ CHECKS: Mapping[str, Callable[[Bench], Iterable[Line]]] = {
     "ranks": rank_lines,
     "stock": stock_lines,
     "liquid": liquid_lines,
-    "company": company_lines,
+    "company": shared_deck_lines,
 }
 """Checks by name; each runs decks on a bench and gives lines."""
