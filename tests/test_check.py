@@ -39,7 +39,7 @@ from walkers.runner.manifest import read_manifest
 from walkers.runner.model_sources import SOURCES
 from walkers.second_engine import kernels
 from walkers.second_engine.audit import CHECKS, record, run_audit
-from walkers.second_engine.crosscheck import cross_check, full_cases, simulate, with_cycles
+from walkers.second_engine.crosscheck import compare_motions, example_cases, simulate, with_cycles
 from walkers.second_engine.engine import TERMS, SecondEngine
 from walkers.second_engine.lines import Line, Verdict, failures, lines_text
 from walkers.second_engine.scenes import (
@@ -153,7 +153,7 @@ def test_the_forces_of_a_pair_conserve_momentum_and_angular_momentum() -> None:
 
 def test_fig1b_is_one_motion_in_both_engines(fig1b: Motion) -> None:
     """Velocity, rotation and sliding agree to 1e-6, and so do places: its contacts stay closed."""
-    velocity, *_, together, farthest = lines = cross_check([fig1b])
+    velocity, *_, together, farthest = lines = compare_motions([fig1b])
     assert failures(lines) == []
     assert velocity.measured == pytest.approx(velocity.expected, rel=1e-6)
     assert together.measured == together.expected
@@ -163,7 +163,7 @@ def test_fig1b_is_one_motion_in_both_engines(fig1b: Motion) -> None:
 @pytest.mark.parametrize("term", TERMS)
 def test_without_a_term_it_disagrees(fig1b: Motion, term: str) -> None:
     """So that agreement says something of that term."""
-    velocity, *_, together, _ = lines = cross_check([fig1b], [term])
+    velocity, *_, together, _ = lines = compare_motions([fig1b], [term])
     assert failures(lines) or together.measured < together.expected
     assert velocity.failed or term in ("damping", "gravity")  # which change it by 2 µm/s
 
@@ -174,12 +174,12 @@ def test_other_kinds_of_cases_agree(name: str, tmp_path: Path) -> None:
 
     To 0.1 nm without rolling friction, which amplifies rounding.
     """
-    case = with_cycles(full_cases()[name], 3)
-    lines = cross_check([run(case, tmp_path).motion])
+    case = with_cycles(example_cases()[name], 3)
+    lines = compare_motions([run(case, tmp_path).motion])
     assert failures(lines) == []
     assert lines[-1].measured < 10.0
     free = case.with_value_at("contact.rolling_friction", 0.0)
-    assert cross_check([run(free, tmp_path).motion])[-1].measured < 1e-4
+    assert compare_motions([run(free, tmp_path).motion])[-1].measured < 1e-4
 
 
 def test_piles_agree_until_they_are_chaotic_and_through_a_restart(

@@ -22,7 +22,7 @@ from walkers.postprocess.measure.sides import REST
 from walkers.postprocess.measure.threshold import _crossed, _thresholds, measure
 from walkers.runner.binary import find_engine
 from walkers.runs.making import make_runs
-from walkers.second_engine.crosscheck import cross_check
+from walkers.second_engine.crosscheck import compare_motions
 from walkers.templates.placement import sharing_key
 
 PERIOD = 1.0 / 80.0
@@ -123,7 +123,7 @@ def test_frames_and_engines_agree_on_a_ramp(with_record: bool, tmp_path: Path) -
         cases.append(case)
     runs = [run(case, tmp_path) for case in cases]
     assert runs[1].result["velocity"] == pytest.approx(runs[0].result["velocity"], rel=2e-5)
-    assert [line for line in cross_check([runs[0].motion]) if line.failed] == []
+    assert [line for line in compare_motions([runs[0].motion]) if line.failed] == []
 
 
 def test_a_run_has_its_record(tmp_path: Path) -> None:

@@ -24,8 +24,8 @@ from walkers.inputs.reading import load_case
 from walkers.physics.capillary import derjaguin_radius
 from walkers.postprocess.measure.motion import Motion
 from walkers.runner.failures import EngineFailure
-from walkers.runner.process import ALONE
-from walkers.second_engine.crosscheck import courses
+from walkers.runner.launch import ALONE
+from walkers.second_engine.crosscheck import divergence_lines
 from walkers.second_engine.lines import Line, Verdict, as_dict, failures, lines_text
 
 
@@ -170,7 +170,7 @@ def test_a_pile_fails_if_a_bead_leaves_its_motion_in_the_first_cycle(
     first = _pile([0.0, 0.25, 0.5, 1.5])
     moved = first.position.copy()
     moved[away:, 1, 0] += 0.011 * 0.3e-3
-    together, farthest = courses(first, replace(first, position=moved))
+    together, farthest = divergence_lines(first, replace(first, position=moved))
     assert (together.expected, together.measured) == pytest.approx((1.5, cycle))
     assert farthest.measured == pytest.approx(0.0 if away == 4 else 3.3)
     assert together.failed == (cycle == 0.5)

@@ -28,7 +28,7 @@ from walkers.postprocess.show.scene import walls_of
 from walkers.runner.binary import find_engine
 from walkers.runner.run_directory import run_place
 from walkers.runs.preview import preview_text, summarise
-from walkers.second_engine.crosscheck import cross_check
+from walkers.second_engine.crosscheck import compare_motions
 from walkers.second_engine.scenes import DRY, Bench, bench_case, full_case, prescribed, scene_of
 from walkers.templates.deck import render_deck
 from walkers.templates.placement import Bead
@@ -519,7 +519,7 @@ def test_beads_are_poured_into_a_vessel_and_stay_there(tmp_path: Path, boundary:
     np.testing.assert_allclose(done.case.boundary.vessel.clearance(ends), 0.0, atol=1e-9)
     if boundary == "funnel":
         with pytest.raises(InputError, match="the second engine knows no facets"):
-            cross_check([motion])
+            compare_motions([motion])
     assert sum(len(corners) - 2 for corners in walls_of(motion)) == len(vessel.triangles)
     assert {"floor"} <= {wall.name for wall in walls}
 

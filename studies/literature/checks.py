@@ -8,7 +8,7 @@ from pathlib import Path
 from studies.literature.benchmarks import benchmarks
 from studies.literature.bridges import pulls, velocities
 from studies.literature.experiments import experiments
-from walkers.second_engine.crosscheck import crosschecks
+from walkers.second_engine.crosscheck import crosscheck_examples
 from walkers.second_engine.lines import Line
 
 
@@ -24,7 +24,7 @@ def _bridges(out: Path) -> Iterator[Line]:
 LITERATURE: Mapping[str, Callable[[Path], Iterable[Line]]] = {
     "benchmarks": _benchmarks,
     "bridges": _bridges,
-    "crosscheck": crosschecks,
+    "crosscheck": crosscheck_examples,
     "experiments": experiments,
 }
 """Each gives its lines from the folder of runs, where missing runs are made."""

@@ -1,7 +1,7 @@
 """Compare finished runs of LIGGGHTS with the second engine: the same start, samples and analysis.
 
-`crosscheck` runs and compares one case, `cross_check` compares runs that are there, and
-`crosschecks` compares cases of all kinds. Forces on a few beads are compared in
+`crosscheck` runs and compares one case, `compare_motions` compares runs that are there, and
+`crosscheck_examples` compares cases of all kinds. Forces on a few beads are compared in
 `walkers.second_engine.scenes`.
 """
 
@@ -40,7 +40,7 @@ SAME_MOTION = 0.01
 """Distance between both positions of a bead, over the smallest radius, up to which two motions
 count as the same."""
 STARTS = 5
-"""Number of random starts with which `crosschecks` compares a pile."""
+"""Number of random starts with which `crosscheck_examples` compares a pile."""
 
 Judgement = Literal["walking", "gait", "orientation", "open contacts", "none"]
 """How a quantity is judged: by `VELOCITY_TOLERANCE`, `GAIT_TOLERANCE` or `ORIENTATION_TOLERANCE`,
@@ -108,10 +108,10 @@ def crosscheck(  # noqa: PLR0913 (keyword-only, and described below)
         changes = {"run.seed": case.run.seed + number} if number else {}
         start = changed_case(case, changes)
         motions.append(run(start, out, progress=progress, engine=engine).motion)
-    return cross_check(motions, without)
+    return compare_motions(motions, without)
 
 
-def cross_check(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Line]:
+def compare_motions(motions: Sequence[Motion], without: Collection[str] = ()) -> list[Line]:
     """Compare finished runs of one case with the second engine.
 
     Parameters
@@ -124,8 +124,8 @@ def cross_check(motions: Sequence[Motion], without: Collection[str] = ()) -> lis
     Returns
     -------
     list of Line
-        First the quantities of `measured`, as means over the starts, then for each start the
-        lines of `courses`. Quantities of piles, which are chaotic, are not judged.
+        First the quantities of `measured_quantities`, as means over the starts, then for each start the
+        lines of `divergence_lines`. Quantities of piles, which are chaotic, are not judged.
     """
     case = motions[0].case
     simulated = [simulate(motion, without) for motion in motions]
@@ -142,7 +142,7 @@ def cross_check(motions: Sequence[Motion], without: Collection[str] = ()) -> lis
             line = replace(line, tolerance=_tolerance(first, fastest), scale=1.0)
         lines.append(line)
     for by_liggghts, by_second_engine in zip(motions, simulated, strict=True):
-        lines += courses(by_liggghts, by_second_engine)
+        lines += divergence_lines(by_liggghts, by_second_engine)
     check = f"{case.name}: LIGGGHTS (expected) and the second engine (measured)"
     if without:
         check += f" without {', '.join(without)}"
@@ -154,7 +154,7 @@ def _mean_quantities(motions: Sequence[Motion]) -> list[ComparedQuantity]:
     quantities: list[ComparedQuantity] = []
     values = []
     for motion in motions:
-        quantities = measured(motion)
+        quantities = measured_quantities(motion)
         values.append([quantity.value for quantity in quantities])
     means = np.mean(values, axis=0).tolist()
     return [replace(quantity, value=mean) for quantity, mean in zip(quantities, means, strict=True)]
@@ -171,7 +171,7 @@ def _tolerance(quantity: ComparedQuantity, fastest: float) -> float:
     return inf
 
 
-def courses(first: Motion, second: Motion) -> Iterator[Line]:
+def divergence_lines(first: Motion, second: Motion) -> Iterator[Line]:
     """When and how far two motions from the same start diverge.
 
     Piles are chaotic and must diverge some time; they fail if they do so in the first cycle of the
@@ -195,7 +195,7 @@ def courses(first: Motion, second: Motion) -> Iterator[Line]:
     yield Line(f"{prefix}largest distance of a bead", 0.0, farthest, unit="µm")
 
 
-def measured(motion: Motion) -> list[ComparedQuantity]:
+def measured_quantities(motion: Motion) -> list[ComparedQuantity]:
     """The quantities of a motion that are compared: of a pile, of loose beads, or of walkers."""
     if motion.case.mixture is not None:
         return _quantities_of_pile(motion)
@@ -358,15 +358,15 @@ def _part_bounds(motion: Motion) -> list[int]:
     return [1, *begins, count]
 
 
-def crosschecks(out: Path) -> Iterator[Line]:
-    """Compare the cases of `full_cases`; ``out`` is the folder of the run directories."""
-    for name, case in full_cases().items():
+def crosscheck_examples(out: Path) -> Iterator[Line]:
+    """Compare the cases of `example_cases`; ``out`` is the folder of the run directories."""
+    for name, case in example_cases().items():
         seeds = STARTS if case.mixture else 1
         for line in crosscheck(case, out, seeds=seeds):
             yield replace(line, quantity=f"{name}: {line.quantity}")
 
 
-def full_cases() -> dict[str, Case]:
+def example_cases() -> dict[str, Case]:
     """Walkers, climbers, clusters, other drives and walls, and a small pile, by name."""
     two_to_the_right = {
         "dimers.angle": "30 deg",

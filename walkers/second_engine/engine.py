@@ -227,7 +227,7 @@ def _bridges(case: Case, radius: FloatArray, strengths: Mapping[str, float]) -> 
     contribution = np.zeros((count, count + 1, 2))
     spans = []
     splines = []
-    volumes = []
+    volumes: list[float] = []
     for row, small in enumerate(sizes.tolist()):
         first_bridge[row, :row] = first_bridge[:row, row]
         contribution[row, :row] = contribution[:row, row, ::-1]
