@@ -100,8 +100,10 @@ def best_case(calibration: Calibration, best: FloatArray, samples: pd.DataFrame)
     tables = calibration.case(np.array(values))
     ranges = flatten(tables.get("uncertain", {}))
     for (name, parameter), value in zip(parameters.items(), values, strict=True):
-        low = min(_rounded(samples[name].quantile(_INTERVAL[0])), value)
-        high = max(_rounded(samples[name].quantile(_INTERVAL[2])), value)
+        lower_end = float(samples[name].quantile(_INTERVAL[0]))
+        upper_end = float(samples[name].quantile(_INTERVAL[2]))
+        low = min(_rounded(lower_end), value)
+        high = max(_rounded(upper_end), value)
         if low >= high or not parameter.acts_in(first):
             continue
         limits = [parameter.written(low), parameter.written(high)]

@@ -124,8 +124,9 @@ def compare_motions(motions: Sequence[Motion], without: Collection[str] = ()) ->
     Returns
     -------
     list of Line
-        First the quantities of `measured_quantities`, as means over the starts, then for each start the
-        lines of `divergence_lines`. Quantities of piles, which are chaotic, are not judged.
+        First the quantities of `measured_quantities`, as means over the starts, then for each
+        start the lines of `divergence_lines`. Quantities of piles, which are chaotic, are not
+        judged.
     """
     case = motions[0].case
     simulated = [simulate(motion, without) for motion in motions]
