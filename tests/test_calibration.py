@@ -26,8 +26,8 @@ from walkers.calibration.observations import (
     NO_NUMBERS,
     Observation,
     misalignment,
-    numbers_in,
-    numbers_of,
+    quantities_of_run,
+    quantities_of_runs,
 )
 from walkers.calibration.report import calibration_record, calibration_summary, draw_facts
 from walkers.errors import InputError
@@ -84,11 +84,11 @@ def test_numbers_are_means_and_ratios_of_means() -> None:
         ({"of": ["a", "b"], "quantity": "slip_1"}, 0.05),
         ({"of": ["a"], "quantity": "largest_angle"}, np.nan),
     ]:
-        assert fact(value=1.0, **given).of_numbers(numbers) == pytest.approx(expected, nan_ok=True)
+        assert fact(value=1.0, **given).number_from(numbers) == pytest.approx(expected, nan_ok=True)
     # Of walkers that walk backward, and of which one does.
     numbers |= {name: {**NO_NUMBERS, "velocity": -v} for name, v in [("-a", 1e-3), ("-b", 2e-3)]}
     for of, over, expected in [("-b", "-a", 2.0), ("b", "-b", -2.0), ("-a", "a", -0.5)]:
-        assert fact(value=1.0, of=[of], over=[over]).of_numbers(numbers) == pytest.approx(expected)
+        assert fact(value=1.0, of=[of], over=[over]).number_from(numbers) == pytest.approx(expected)
     ends = pd.DataFrame({"orientation_end": np.radians([3.0, -8.0, 178.0, 95.0, -270.0])})
     np.testing.assert_allclose(misalignment(ends), [3.0, 8.0, 2.0, 85.0, 90.0])
 
@@ -110,7 +110,7 @@ def test_values_of_the_prior() -> None:
     ends = norm.cdf(np.log(np.array([10.0, 200.0]) / 40.0) / 0.5)
     expected = (norm.cdf(np.log(values / 40.0) / 0.5) - ends[0]) / (ends[1] - ends[0])
     np.testing.assert_allclose(shares, expected, atol=1e-9)
-    np.testing.assert_allclose(narrow.unit_of(values), shares, atol=1e-9)
+    np.testing.assert_allclose(narrow.shares(values), shares, atol=1e-9)
 
 
 def known(unit: FloatArray) -> FloatArray:
@@ -126,7 +126,7 @@ DESIGN, TRUTH = unit_cube(2, 64, 1), np.array([[0.4, 0.6]])
 def emulators() -> tuple[Emulator, ...]:
     each = zip("ab", known(TRUTH)[0], known(DESIGN).T, strict=True)
     return tuple(
-        Emulator.of(fact(name, value=value, deviation=0.2), DESIGN, column, 1)
+        Emulator.fit(fact(name, value=value, deviation=0.2), DESIGN, column, 1)
         for name, value, column in each
     )
 
@@ -139,7 +139,7 @@ def test_emulators_know_their_error(emulators: tuple[Emulator, ...]) -> None:
         assert np.median(np.abs(value - true)) < 0.01
         assert np.mean(np.abs(value - true) <= above - value + 1e-6) > 0.9
     numbers = DESIGN.sum(axis=1) + 0.2 * np.random.default_rng(3).standard_normal(64)
-    noisy = Emulator.of(fact(value=1.0, deviation=0.1), DESIGN, numbers, 1)
+    noisy = Emulator.fit(fact(value=1.0, deviation=0.1), DESIGN, numbers, 1)
     assert min(one.inflation for one in (*emulators, noisy)) >= 1.0
     mean, error = noisy.process.predict(DESIGN, return_std=True)
     np.testing.assert_allclose([mean, 3.0 * error], replace(noisy, inflation=3.0).predict(DESIGN))
@@ -155,11 +155,12 @@ def test_emulators_know_their_error(emulators: tuple[Emulator, ...]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "far"), [("value", -LARGEST_DISTANCE), ("least", -LARGEST_DISTANCE), ("most", LARGEST_DISTANCE)]
+    ("given", "far"),
+    [("value", -LARGEST_DISTANCE), ("least", -LARGEST_DISTANCE), ("most", LARGEST_DISTANCE)],
 )
 def test_what_does_not_exist_is_far_off(given: str, far: float) -> None:
     outcome = np.where(DESIGN[:, 0] > 0.5, np.nan, 1.0)
-    emulator = Emulator.of(fact(**{given: 1.0}), DESIGN, outcome, 1)
+    emulator = Emulator.fit(fact(**{given: 1.0}), DESIGN, outcome, 1)
     assert emulator.predict(np.array([[0.1, 0.5], [0.9, 0.5]]))[0] == pytest.approx(
         [0.0, far], abs=1.0
     )
@@ -187,7 +188,7 @@ def test_likelihoods_are_students_of_the_distance_and_of_the_side_of_a_limit(
 def test_the_posterior_is_that_of_a_grid_and_of_what_is_used(
     emulators: tuple[Emulator, ...],
 ) -> None:
-    posterior = Posterior.of(emulators, 1 << 14, 1)
+    posterior = Posterior.from_emulators(emulators, 1 << 14, 1)
     grid = np.stack(np.meshgrid(*[np.linspace(0.005, 0.995, 100)] * 2), axis=-1).reshape(-1, 2)
     weight = np.exp(np.sum([one.log_likelihood(grid) for one in emulators], axis=0))
     mean = weight @ grid / weight.sum()
@@ -198,14 +199,14 @@ def test_the_posterior_is_that_of_a_grid_and_of_what_is_used(
     assert posterior.effective_samples == pytest.approx(
         weight.sum() ** 2 / np.sum(weight**2) * 1.6384, rel=0.05
     )
-    without = Posterior.of(emulators, 1 << 12, 1, "b")
+    without = Posterior.from_emulators(emulators, 1 << 12, 1, "b")
     narrow, wide = (
         emulators[1].numbers(one.samples, np.zeros(4000)).std() for one in (posterior, without)
     )
     assert wide > 1.5 * narrow
     derived = replace(emulators[1], observation=fact("b", value=1.0, derived=True))
     np.testing.assert_array_equal(
-        Posterior.of([emulators[0], derived], 1 << 12, 1).samples, without.samples
+        Posterior.from_emulators([emulators[0], derived], 1 << 12, 1).samples, without.samples
     )
 
 
@@ -282,7 +283,9 @@ def numbers(
 ) -> dict[str, dict[str, float]]:
     """Quantities of the experiments at a parameter set."""
     record, _ = run_sweep(found.sweep("one", np.array([values])), out, options)
-    return dict(zip(found.experiments, numbers_in(load_table(record.directory)), strict=True))
+    return dict(
+        zip(found.experiments, quantities_of_runs(load_table(record.directory)), strict=True)
+    )
 
 
 @pytest.mark.slow
@@ -363,8 +366,8 @@ def test_a_run_that_ended_early_slides_as_one_of_so_many_cycles(tmp_path: Path) 
     cycles = round(early.result.table("trajectory")["cycle"].max())
     assert cycles < early.case.run.cycles
     given = {"dimers.replicates": 1, "run.cycles": cycles, "run.settling_cycles": cycles // 3}
-    fixed = numbers_of(run(load_case("fig1b", given), tmp_path).directory)
-    assert numbers_of(early.directory) == pytest.approx(fixed, rel=1e-6, nan_ok=True)
+    fixed = quantities_of_run(run(load_case("fig1b", given), tmp_path).directory)
+    assert quantities_of_run(early.directory) == pytest.approx(fixed, rel=1e-6, nan_ok=True)
     assert fixed["slip_1"] > 0.0
     # There is nothing to be observed of walkers that came apart.
     with recomputed(early.directory, ["walkers.parquet"]):
@@ -374,7 +377,7 @@ def test_a_run_that_ended_early_slides_as_one_of_so_many_cycles(tmp_path: Path) 
             "walkers",
             columns | {"separated_fraction": columns["separated_fraction"] + 0.5},
         )
-    assert np.isnan([*numbers_of(early.directory).values()]).all()
+    assert np.isnan([*quantities_of_run(early.directory).values()]).all()
 
 
 LONE = {"name": "v", "group": "v", "of": ["slow"], "value": "1 mm/s", "deviation": "1 mm/s"}
@@ -388,7 +391,7 @@ def test_a_walker_that_still_turns_is_observed_by_its_angle_alone(
     times = {"cycles": 12, "settling_cycles": 6, "samples_per_cycle": 20, "seed": 39}
     changes = {"run": times, "drive": {"peak_acceleration": "3 g"}}
     both, alone = (
-        numbers_of(run_directory(dimers={**start, "replicates": count}, **changes))
+        quantities_of_run(run_directory(dimers={**start, "replicates": count}, **changes))
         for count in (2, 1)
     )
     assert both.pop("largest_angle") > 30.0

@@ -16,7 +16,7 @@ from studies.paper.make import FIGURES, make_figures
 from studies.paper.sources import NothingFinishedError, Sources, of_facts, ruby, sets, sweep_of
 from tests.printed import letters, spoilt
 from walkers.arrays import FloatArray
-from walkers.calibration.observations import numbers_of
+from walkers.calibration.observations import quantities_of_run
 from walkers.inputs.keys import flatten
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.loads import dimer_of
@@ -131,7 +131,7 @@ def test_facts_are_judged_by_the_runs_of_their_set(
 ) -> None:
     facts = {one["name"]: one for one in compared["facts"]}
     runs = zip(ruby().experiments, sources.table(of_facts("shipped"))["run"], strict=True)
-    found = {label: numbers_of(run) for label, run in runs}
+    found = {label: quantities_of_run(run) for label, run in runs}
     assert list(facts) == [one.name for one in ruby().file.observations]
     assert list(compared["sets"]) == list(sets())
     assert facts["fig4a_velocity"]["values"]["shipped"] == pytest.approx(

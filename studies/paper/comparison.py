@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from studies.paper.sources import Sources, of_facts, ruby, sets, sweep_of, thresholds_with_theory
-from walkers.calibration.observations import LEAST_SPEED, Observation, numbers_in
+from walkers.calibration.observations import LEAST_SPEED, Observation, quantities_of_runs
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.measure.results import json_numbers
@@ -43,7 +43,7 @@ def compare(sources: Sources) -> dict[str, Any]:
     }
     tables = {name: sources.table(of_facts(name)) for name in sets()}
     numbers = {
-        name: dict(zip(experiments, numbers_in(table), strict=True))
+        name: dict(zip(experiments, quantities_of_runs(table), strict=True))
         for name, table in tables.items()
     }
     theory = _by_theory(cases["shipped"])
@@ -101,7 +101,7 @@ def _fact(
     observation: Observation, numbers: Mapping[str, Numbers], theory: Numbers
 ) -> dict[str, Any]:
     values, scale = (
-        {name: observation.of_numbers(of_set) for name, of_set in numbers.items()},
+        {name: observation.number_from(of_set) for name, of_set in numbers.items()},
         observation.unit[1],
     )
     return {
@@ -113,7 +113,7 @@ def _fact(
         "values": json_numbers({name: value * scale for name, value in values.items()}),
         "texts": {name: _text_of(value, observation) for name, value in values.items()},
         "agree": {name: observation.agrees(value) for name, value in values.items()},
-        **json_numbers({"theory": observation.of_numbers(theory) * scale}),
+        **json_numbers({"theory": observation.number_from(theory) * scale}),
     }
 
 

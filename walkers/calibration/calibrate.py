@@ -17,7 +17,7 @@ import numpy as np
 from walkers.arrays import FloatArray
 from walkers.calibration.emulator import Emulator, Posterior
 from walkers.calibration.file import Calibration
-from walkers.calibration.observations import NO_NUMBERS, Observation, numbers_in
+from walkers.calibration.observations import NO_NUMBERS, Observation, quantities_of_runs
 from walkers.errors import WalkersError
 from walkers.extras import require
 from walkers.inputs.axes import unit_cube
@@ -139,7 +139,7 @@ class _Sweeps:
             self.failures[sweep.name] = failed
         table = load_table(record.directory)
         _check_complete(name, table, failed)
-        return _observed(self.calibration, experiments, numbers_in(table))
+        return _observed(self.calibration, experiments, quantities_of_runs(table))
 
 
 def calibrate(
@@ -200,10 +200,12 @@ def calibrate(
     emulators = {}
     for observation, column in zip(file.observations, numbers.T, strict=True):
         if not observation.costly:
-            emulators[observation.name] = Emulator.of(observation, points, column, design.seed)
+            emulators[observation.name] = Emulator.fit(observation, points, column, design.seed)
     all_emulators = list(emulators.values())
-    posterior = Posterior.of(all_emulators, design.posterior, design.seed)
-    held_out = Posterior.of(all_emulators, design.posterior, design.seed, design.held_out)
+    posterior = Posterior.from_emulators(all_emulators, design.posterior, design.seed)
+    held_out = Posterior.from_emulators(
+        all_emulators, design.posterior, design.seed, design.held_out
+    )
 
     best_of_all = points[nearest(file.observations, numbers)]
     proposed = np.stack([posterior.best, held_out.best, best_of_all])
@@ -259,7 +261,7 @@ def _observed(
         for number, experiment in enumerate(experiments):
             numbers[experiment] = numbers_of_runs[start + number]
         observations = calibration.file.observations
-        rows.append([observation.of_numbers(numbers) for observation in observations])
+        rows.append([observation.number_from(numbers) for observation in observations])
     return np.array(rows)
 
 

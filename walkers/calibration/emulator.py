@@ -86,7 +86,7 @@ class Emulator:
     inflation: float
 
     @classmethod
-    def of(
+    def fit(
         cls, observation: Observation, points: FloatArray, numbers: FloatArray, seed: int
     ) -> Emulator:
         """Fit an emulator to numbers of the engine.
@@ -219,7 +219,7 @@ class Posterior:
     seed: int
 
     @classmethod
-    def of(
+    def from_emulators(
         cls, emulators: Sequence[Emulator], count: int, seed: int, without: Collection[str] = ()
     ) -> Posterior:
         """Weight points of the prior by the likelihood of observations.

@@ -96,7 +96,7 @@ class Parameter(ConfigTable):
         scaled = np.asarray(self._prior.ppf(shares))
         return np.exp(scaled) if self.log else scaled
 
-    def unit_of(self, values: FloatArray | float) -> FloatArray:
+    def shares(self, values: FloatArray | float) -> FloatArray:
         """The shares of the prior, 0 to 1, that lie below these values, which are in ``unit``."""
         return np.asarray(self._prior.cdf(np.log(values) if self.log else values))
 
@@ -218,7 +218,7 @@ class Calibration:
         points = np.empty((len(self.file.sets), len(parameters)))
         for row, values in enumerate(self.file.sets.values()):
             for column, (name, parameter) in enumerate(parameters.items()):
-                points[row, column] = parameter.unit_of(values[name])
+                points[row, column] = parameter.shares(values[name])
         return points
 
     @property

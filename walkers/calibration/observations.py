@@ -1,8 +1,8 @@
 """Observations: facts about walkers, and the numbers of simulations to compare them with.
 
 A calibration weighs its free parameters with observations, and the comparison with the paper judges
-the shipped ones. An observation knows no run: `Observation.of_numbers` takes the numbers of each
-experiment. `numbers_of` reads them from a run, and a theory may give them as well.
+the shipped ones. An observation knows no run: `Observation.number_from` takes the numbers of each
+experiment. `quantities_of_run` reads them from a run, and a theory may give them as well.
 """
 
 from __future__ import annotations
@@ -165,13 +165,13 @@ class Observation(ConfigTable):
             limits.append(f"at most {self.most * scale:.4g}")
         return f"{' and '.join(limits)} ± {self.deviation * scale:.2g} {unit}".strip()
 
-    def of_numbers(self, numbers: Mapping[str, Mapping[str, float]]) -> float:
+    def number_from(self, numbers: Mapping[str, Mapping[str, float]]) -> float:
         """The number of this observation.
 
         Parameters
         ----------
         numbers
-            Quantities by name (as `numbers_of` gives them), by the names of experiments.
+            Quantities by name (as `quantities_of_run` gives them), by the names of experiments.
 
         Returns
         -------
@@ -205,7 +205,7 @@ def observation_kind(quantity: str) -> QuantityKind | None:
     return None
 
 
-def numbers_of(run: str | Path) -> dict[str, float]:
+def quantities_of_run(run: str | Path) -> dict[str, float]:
     """All quantities of the finished run of a dimer.
 
     Parameters
@@ -254,12 +254,12 @@ def _slips(results: Results, walker_count: int, rows: IntArray) -> dict[str, flo
     return slips
 
 
-def numbers_in(table: pd.DataFrame) -> list[dict[str, float]]:
-    """`numbers_of` each run in the table of a sweep; NaN for runs that are not finished."""
+def quantities_of_runs(table: pd.DataFrame) -> list[dict[str, float]]:
+    """`quantities_of_run` each run in the table of a sweep; NaN for runs that are not finished."""
     numbers = []
     for run, status in zip(table["run"], table["status"], strict=True):
         if status == "finished":
-            numbers.append(numbers_of(run))
+            numbers.append(quantities_of_run(run))
         else:
             numbers.append(NO_NUMBERS)
     return numbers
