@@ -183,10 +183,16 @@ def contents_of(directory: Path, *, dumps: bool = True) -> Contents:
 
 
 class _Packing:
-    """Collects the files and manifests of an archive.
+    """Collects the files and manifests of an archive. A ``place`` is a path in the archive.
 
-    ``files``, ``manifests``, ``cases`` and ``directories`` are by paths in the archive. Those of a
-    run are by the path of its folder.
+    Attributes
+    ----------
+    dumps
+        Whether the archive includes the dumps of the engine.
+    files
+        Files by their places.
+    manifests, cases, directories
+        Manifests, cases and directories of the runs, by the places of their folders.
     """
 
     def __init__(self, dumps: bool) -> None:

@@ -121,7 +121,8 @@ def _verify_sweep(directory: Path) -> list[Verification]:
     summary = f"{len(runs)} points have a run"
     points = Verification(record.sweep.name, summary, {Finding.MISSING: missing})
     # Several points may have the same run.
-    return [points, *[_verify_run(run) for run in dict.fromkeys(runs)]]
+    verified_runs = [_verify_run(run) for run in dict.fromkeys(runs)]
+    return [points, *verified_runs]
 
 
 def _verify_run(directory: Path) -> Verification:
@@ -213,28 +214,30 @@ def _folder_of(name: str) -> str:
 
 def _verify_zip(path: Path) -> Verification:
     """Compare the files of an archive that is not unpacked with the checksums in it."""
+    changed = []
+    missing = []
     try:
         with zipfile.ZipFile(path) as archive:
-            names = archive.namelist()
-            if SUMS_NAME not in names:
+            entries = Counter(archive.namelist())
+            if SUMS_NAME not in entries:
                 raise input_error(path, f"expected an archive, which has a {SUMS_NAME}")
             listed = _listed_checksums(path, archive.read(SUMS_NAME))
-            present = [name for name in listed if name in names]
-            sums = {name: _checksum_in(archive, name) for name in present}
+            for name, checksum in listed.items():
+                if name not in entries:
+                    missing.append(name)
+                elif _checksum_in(archive, name) != checksum:
+                    changed.append(name)
     except _ZIP_ERRORS as error:
         raise input_error(path, f"expected an archive, a zip file ({error})") from error
-    changed = [name for name in present if sums[name] != listed[name]]
-    missing = [name for name in listed if name not in sums]
-    entries = Counter(names)
     not_listed = [name for name in entries if name not in listed and name != SUMS_NAME]
     # Of two files of the same name, programs that unpack take either one.
-    not_listed += [name for name, count in entries.items() if count > 1]
+    duplicates = [name for name, count in entries.items() if count > 1]
     findings = {
         Finding.CHANGED: changed,
         Finding.MISSING: missing,
-        Finding.NOT_LISTED: not_listed,
+        Finding.NOT_LISTED: not_listed + duplicates,
     }
-    unchanged = len(present) - len(changed)
+    unchanged = len(listed) - len(changed) - len(missing)
     return Verification(path.name, f"{unchanged} files are unchanged", findings)
 
 
