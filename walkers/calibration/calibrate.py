@@ -185,7 +185,8 @@ def calibrate(
     file = calibration.file
     design = file.design
     experiments = list(calibration.experiments)
-    cheap = [name for name in experiments if name not in calibration.costly]
+    costly = calibration.costly
+    cheap = [name for name in experiments if name not in costly]
     without_dumps = replace(options, final=FINAL, dumps=False)
     sweeps = _Sweeps(calibration, out, without_dumps, progress, engine)
 
@@ -226,7 +227,10 @@ def calibrate(
 
 
 def _check_ranges(calibration: Calibration) -> None:
-    """Refuse ranges of parameters that exceed those of their keys: make the cases at their ends."""
+    """Refuse ranges of parameters that exceed those of their keys.
+
+    It resolves the cases at both ends of the ranges, which raise `InputError`.
+    """
     ranges = [parameter.range for parameter in calibration.file.parameters.values()]
     ends = np.array(ranges).T
     for _case in calibration.sweep(calibration.name, ends).cases():

@@ -1,6 +1,6 @@
 """Compare finished runs of LIGGGHTS with the second engine: the same start, samples and analysis.
 
-`crosscheck` runs and compares one case, `compare_motions` compares runs that are there, and
+`crosscheck` runs and compares one case, `compare_motions` compares finished runs, and
 `crosscheck_examples` compares cases of all kinds. Forces on a few beads are compared in
 `walkers.second_engine.scenes`.
 """

@@ -110,8 +110,9 @@ def run_checks(
     on_done: Callable[[str], None] | None = None,
     map_function: Map = map,
 ) -> list[Line]:
-    """Run checks and collect their lines; a check that cannot be computed gives a line that says
-    so.
+    """Run checks and collect their lines.
+
+    A check that cannot be computed gives one line that says so.
 
     Parameters
     ----------
