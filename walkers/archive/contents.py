@@ -270,15 +270,16 @@ class _Packing:
 
         place = f"{RUNS_FOLDER}/{name}"
         table = load_table(record.directory)
-        # Paths in the archive, not on this machine.
-        table["run"] = [f"{RUNS_FOLDER}/{Path(run).name}" if run else "" for run in table["run"]]
+        table["run"] = [_place_of(run) for run in table["run"]]
         self.add(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)
         for form in ("csv", "parquet"):
             self.add(f"{place}/table.{form}", encoded(table, form))
         self.add(f"{place}/{name}.toml", toml_bytes(record.sweep.file))
-        finished = [state for state in states(record) if state.status == "finished"]
-        runs = [self.add_run(state.directory) for state in finished if state.directory]
-        return list(dict.fromkeys(runs))
+        runs: dict[str, None] = {}
+        for state in states(record):
+            if state.status == "finished" and state.directory:
+                runs[self.add_run(state.directory)] = None
+        return list(runs)
 
     def add_companions(self, run: Path) -> None:
         """Add the spread and the accuracy of a run directory, which are sweeps beside it, if any.
@@ -302,6 +303,13 @@ class _Packing:
         self.add(f"{MODEL_FOLDER}/build.sh", build_script().encode())
         script = resources.files("walkers.archive").joinpath(REPEAT_NAME)
         self.add(REPEAT_NAME, script.read_bytes())
+
+
+def _place_of(run: str) -> str:
+    """The folder in the archive of a run on this machine; empty for a point without a run."""
+    if not run:
+        return ""
+    return f"{RUNS_FOLDER}/{Path(run).name}"
 
 
 def _is_dump(name: str) -> bool:

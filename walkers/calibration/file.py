@@ -250,11 +250,16 @@ class Calibration:
         InputError
             If the sweep cannot be made, or its case has no dimers.
         """
-        points = []
-        for row in [None] if values is None else values:
-            for experiment in experiments or self.experiments:
-                changes = {} if row is None else self._changes(experiment, row)
-                points.append({**self.experiments[experiment], **changes})
+        chosen = experiments or self.experiments
+        points: list[Mapping[str, Value]] = []
+        if values is None:
+            points = [self.experiments[experiment] for experiment in chosen]
+        else:
+            for row in values:
+                points += [
+                    {**self.experiments[experiment], **self._changes(experiment, row)}
+                    for experiment in chosen
+                ]
         for_all_points = flatten(self.file.set)
         columns = {}
         for key in points[0]:

@@ -132,8 +132,8 @@ def compare_motions(motions: Sequence[Motion], without: Collection[str] = ()) ->
     simulated = [simulate(motion, without) for motion in motions]
     expected = _mean_quantities(motions)
     reproduced = _mean_quantities(simulated)
-    speeds = [abs(quantity.value) for quantity in expected if quantity.unit == "mm/s"]
-    fastest = max(speeds, default=0.0)
+    speeds = [quantity.value for quantity in expected if quantity.unit == "mm/s"]
+    fastest = max(abs(speed) for speed in speeds)
     lines = []
     for first, second in zip(expected, reproduced, strict=True):
         if first.judgement == "open contacts" and first.value == second.value == 0.0:

@@ -68,7 +68,9 @@ class SecondEngine:
     ) -> None:
         self.clock = clock
         radius = np.ascontiguousarray(radius, dtype=np.float64)
-        strengths = {term: 0.0 if term in without else 1.0 for term in TERMS}
+        strengths = dict.fromkeys(TERMS, 1.0)
+        for term in without:
+            strengths[term] = 0.0
         self.constants = _constants(case, radius, walls or case.boundary.walls, strengths)
         self.state = _state(start, wall_count=len(self.constants.wall_point))
         kernels.list_neighbours(self.constants, self.state)
