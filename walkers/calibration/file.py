@@ -89,7 +89,10 @@ class Parameter(ConfigTable):
 
     def written(self, value: float) -> Value:
         """A value of the parameter as a case file has it, with its unit and six digits."""
-        return f"{value:.6g} {self.unit}" if self.unit else float(f"{value:.6g}")
+        digits = f"{value:.6g}"
+        if self.unit:
+            return f"{digits} {self.unit}"
+        return float(digits)
 
     def values(self, shares: FloatArray) -> FloatArray:
         """The values, in ``unit``, below which these shares of the prior lie."""
@@ -411,9 +414,9 @@ def _problems_of_sets(file: CalibrationFile) -> Iterator[Problem]:
             value = values.get(name)
             low, high = parameter.range
             if value is None or not low <= value <= high:
-                text = None if value is None else f"{value:g}"
+                written = None if value is None else f"{value:g}"
                 expected = f"expected a number in the range of the parameter, {low:g} to {high:g}"
-                yield Problem(f"sets.{set_name}.{name}", text, expected)
+                yield Problem(f"sets.{set_name}.{name}", written, expected)
 
 
 def _problems_of_keys(file: CalibrationFile, required: Collection[str]) -> Iterator[Problem]:
@@ -428,9 +431,11 @@ def _problems_of_keys(file: CalibrationFile, required: Collection[str]) -> Itera
         for key in sorted(set(required) - flatten(table).keys()):
             expected = "missing; expected it here or in [set]: other experiments change it"
             yield Problem(f"experiments.{experiment}.{key}", None, expected)
-        acting = [item for item in file.parameters.values() if item.acts_in(experiment)]
         for key in keys_of_parameters:
-            count = sum(key in parameter.keys for parameter in acting)
+            count = 0
+            for parameter in file.parameters.values():
+                if parameter.acts_in(experiment) and key in parameter.keys:
+                    count += 1
             if count != 1:
                 expected = (
                     f"expected one parameter that sets {key} for {experiment}, "

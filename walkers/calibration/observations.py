@@ -148,9 +148,13 @@ class Observation(ConfigTable):
         """
         if self.value is not None:
             return self.value, self.value
-        least = -inf if self.least is None else self.least
-        most = inf if self.most is None else self.most
-        return least, most
+        low = -inf
+        high = inf
+        if self.least is not None:
+            low = self.least
+        if self.most is not None:
+            high = self.most
+        return low, high
 
     @property
     def text(self) -> str:

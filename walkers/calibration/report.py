@@ -106,9 +106,10 @@ def best_case(calibration: Calibration, best: FloatArray, samples: pd.DataFrame)
         high = max(_rounded(upper_end), value)
         if low >= high or not parameter.acts_in(first):
             continue
-        limits = [parameter.written(low), parameter.written(high)]
-        for key in parameter.keys:
-            ranges[key] = {"loguniform": limits} if parameter.log else limits
+        limits: Any = [parameter.written(low), parameter.written(high)]
+        if parameter.log:
+            limits = {"loguniform": limits}
+        ranges |= dict.fromkeys(parameter.keys, limits)
     return {**tables, "uncertain": ranges}
 
 
