@@ -172,7 +172,7 @@ def readable_key(key: str) -> str:
     return words.replace(".", " ").replace("_", " ")
 
 
-def numbers_of(rows: pd.DataFrame, name: str, option: str) -> Factor:
+def number_factor(rows: pd.DataFrame, name: str, option: str) -> Factor:
     """A column of numbers in its displayed unit."""
     import pandas as pd
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from walkers.errors import InputError, input_error
-from walkers.sweeps.factors import Factor, factors_of, numbers_of, readable_key
+from walkers.sweeps.factors import Factor, factors_of, number_factor, readable_key
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.table import SEEDS, find_name
 
@@ -113,7 +113,7 @@ def _chosen(
     values = rows[column].tolist()
     if all(isinstance(value, str) for value in values):
         return Factor((column,), readable_key(column), values, is_number=False)
-    return numbers_of(rows, column, option)
+    return number_factor(rows, column, option)
 
 
 def _default_x(factors: Sequence[Factor], rows: pd.DataFrame) -> list[Factor]:
@@ -124,7 +124,7 @@ def _default_x(factors: Sequence[Factor], rows: pd.DataFrame) -> list[Factor]:
     candidates = [factor for factor in factors if factor.keys[0] not in SEEDS] or factors
     candidates = [factor for factor in candidates if factor.is_number] or candidates
     if not candidates:
-        return [numbers_of(rows, "point", "x")]
+        return [number_factor(rows, "point", "x")]
     return [max(candidates, key=lambda factor: len(factor.levels))]
 
 

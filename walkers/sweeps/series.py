@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from walkers.postprocess.measure.quantities import LABELS, scatter_of
 from walkers.postprocess.show.drawing import errors_seen, plain_text
-from walkers.sweeps.factors import Factor, numbers_of
+from walkers.sweeps.factors import Factor, number_factor
 from walkers.sweeps.predictions import Theory
 from walkers.sweeps.table import SEEDS
 
@@ -103,8 +103,8 @@ def points_of(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, p
     }
     for name, source in sources.items():
         if source and source in done and done[source].notna().any():
-            points[name] = numbers_of(done, source, "y").values
-    factor = numbers_of(done, column, "y")
+            points[name] = number_factor(done, source, "y").values
+    factor = number_factor(done, column, "y")
     if "down" in points:  # the figure has walkers of both directions
         factor = replace(factor, name=LABELS[column]["both"])
     return factor.label, points
