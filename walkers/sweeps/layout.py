@@ -14,7 +14,7 @@ from walkers.sweeps.table import SEEDS, find_name
 if TYPE_CHECKING:
     import pandas as pd
 
-NONE = "none"
+NO_FACTOR = "none"
 """What an option says to leave out colours or panels."""
 
 
@@ -80,7 +80,7 @@ def figure_layout(
     shown += [factor for factor in factors if factor.is_among(along) and not factor.is_sample]
     hidden = [factor for factor in left if not _follows_from(shown, factor)]
     layout = FigureLayout(along, hue, panels, hidden)
-    if NONE not in (options.hue, options.panels):
+    if NO_FACTOR not in (options.hue, options.panels):
         _check_all_shown(layout)
     return layout
 
@@ -103,7 +103,7 @@ def _chosen(
     option: str, name: str | None, factors: Sequence[Factor], rows: pd.DataFrame
 ) -> Factor | None:
     """The factor of a key or a column that an option names; None without a name."""
-    if name is None or (name == NONE and option != "x"):
+    if name is None or (name == NO_FACTOR and option != "x"):
         return None
     keys = [key for factor in factors for key in factor.keys]
     column = find_name(option, name, [*keys, *rows.columns])

@@ -15,7 +15,7 @@ from walkers.postprocess.show.report.page import NAME, check_report, fill, page_
 from walkers.sweeps.factors import readable_key
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
-from walkers.sweeps.layout import NONE
+from walkers.sweeps.layout import NO_FACTOR
 from walkers.sweeps.left_out import LeftOutWarning
 from walkers.sweeps.table import SweepTable, cells_of
 
@@ -81,7 +81,7 @@ def _figure(table: SweepTable) -> tuple[str, list[str]]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LeftOutWarning)
         try:
-            svg = svg_of(figure_of(table, FigureOptions(panels=NONE)))
+            svg = svg_of(figure_of(table, FigureOptions(panels=NO_FACTOR)))
         except InputError as error:
             return "", [str(error)]
     return svg, [str(warning.message) for warning in caught]
