@@ -110,7 +110,7 @@ class Theory:
         along = numbers
         name = x.keys[0]
         if name != key:
-            along = [factor_shown(self.done, name) * derived(case)[name] for case in cases]
+            along = [units_per_si(self.done, name) * derived(case)[name] for case in cases]
         return np.array(along), _shown(self.done, self.column, predicted)
 
     def _key_along(self, rows: npt.NDArray[np.int64], x: Factor) -> str | None:
@@ -157,10 +157,10 @@ def _shown(
     done: pd.DataFrame, column: str, predicted: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
     """Predictions in the displayed unit of a column."""
-    factor = factor_shown(done, column)
+    factor = units_per_si(done, column)
     return {model: factor * values for model, values in predicted.items()}
 
 
-def factor_shown(done: pd.DataFrame, column: str) -> float:
+def units_per_si(done: pd.DataFrame, column: str) -> float:
     """How many displayed units an SI unit of a column is."""
     return unit_shown(done.attrs["units"].get(column) or "")[1]
