@@ -33,7 +33,7 @@ from walkers.sweeps.predictions import Predict, Theory
 from walkers.sweeps.scales import scale_x, scale_y
 from walkers.sweeps.series import (
     Series,
-    aside_of,
+    category_offset,
     draw_legend,
     draw_series,
     draw_theory,
@@ -239,7 +239,7 @@ def _draw_panel(
     for number, (level, look) in enumerate(looks.items()):
         aside = 0.0
         if not panel.x.is_number:
-            aside = aside_of(number, len(looks))
+            aside = category_offset(number, len(looks))
         drawn = panel.drawn
         if hue is not None:
             drawn = drawn & _has_level(hue, level)

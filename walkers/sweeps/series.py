@@ -133,7 +133,7 @@ def level_styles(hue: Factor | None, *, hollow: bool) -> dict[Any, dict[str, Any
     return looks
 
 
-def aside_of(number: int, count: int) -> float:
+def category_offset(number: int, count: int) -> float:
     """Where the symbols of one of several colours are beside their category."""
     distance = min(_MOST_ASIDE, 0.6 / count)
     return (number - (count - 1) / 2.0) * distance
