@@ -41,7 +41,7 @@ from walkers.runs.comparison import Side, compare_runs
 from walkers.runs.listing import bytes_text, size_and_last_change
 from walkers.runs.removal import remove, unfinished_in
 from walkers.sweeps.record import read_sweep_record
-from walkers.sweeps.removal import named_in
+from walkers.sweeps.removal import removals_in
 from walkers.sweeps.scheduler import SweepOptions, plan_sweep
 
 
@@ -272,7 +272,7 @@ def test_clean_holds_the_lock_and_takes_the_manifest_first(
 ) -> None:
     """A removal that ends in between leaves no finished run, and a run that was locked after the question stays."""
     first, second = list(finished_places(out).values())[:2]
-    removals = named_in(out, [first, second])
+    removals = removals_in(out, [first, second])
     with locked([second]):
         with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
             patched.setattr("walkers.runs.removal._remove_contents", _interrupted)
@@ -302,7 +302,7 @@ def test_a_removal_that_is_interrupted_leaves_the_case_until_the_end(out: Path) 
         patched.setattr(
             "walkers.runs.removal._remove_directory", lambda folder: left.extend(folder.iterdir())
         )
-        remove(named_in(out, [place]))
+        remove(removals_in(out, [place]))
     assert len(names) > 3
     assert [entry.name for entry in left] == ["case.json"]
 

@@ -19,7 +19,7 @@ from walkers.runner.run_directory import UNFINISHED
 from walkers.runs.by_hand import as_run, write_folder
 from walkers.runs.names import find
 from walkers.runs.removal import Removal, removal_text, remove, unfinished_in
-from walkers.sweeps.removal import named_in
+from walkers.sweeps.removal import removals_in
 from walkers.templates.deck import RUN_NAME, render_deck, single_segment
 
 _REMOVED = (
@@ -144,7 +144,7 @@ def _removals(names: Sequence[str], out: Path) -> list[Removal]:
     if not names:
         return unfinished_in(out)
     directories = apply_all(partial(_directory_to_remove, out=out), names)
-    return named_in(out, directories)
+    return removals_in(out, directories)
 
 
 def _directory_to_remove(name: str, out: Path) -> Path:

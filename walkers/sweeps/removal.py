@@ -13,7 +13,7 @@ from walkers.sweeps.listing import inventory, run_of_sweep
 from walkers.sweeps.record import RECORD_NAME, read_sweep_record
 
 
-def named_in(out: Path, places: Sequence[Path]) -> list[Removal]:
+def removals_in(out: Path, places: Sequence[Path]) -> list[Removal]:
     """The removal of runs and sweeps in a folder of runs.
 
     With a sweep go the runs that no other sweep has; with a run go its spread and its accuracy.
