@@ -33,7 +33,7 @@ from walkers.postprocess.measure.uncertainty import SPREAD_NAME, spread_of
 from walkers.postprocess.measure.walking import _velocities
 from walkers.rounding import rounded
 from walkers.runs.case_text import quantity_kind
-from walkers.sweeps.accuracy import measure_accuracy, times_of
+from walkers.sweeps.accuracy import measure_accuracy, modulus_factors
 from walkers.sweeps.listing import inventory, listing_text
 from walkers.sweeps.scheduler import SweepOptions
 from walkers.sweeps.table import default_column
@@ -424,7 +424,7 @@ def test_beads_are_compared_with_the_hardest_possible(
         },
         name="steel",
     )
-    assert times_of(case) == times
+    assert modulus_factors(case) == times
     if len(times) > 2:
         return
     done = walkers.run(case, tmp_path)

@@ -137,7 +137,7 @@ def run(
     from walkers.runner.failures import EngineFailure
     from walkers.runs.names import find
     from walkers.runs.preview import notes
-    from walkers.sweeps.accuracy import times_of
+    from walkers.sweeps.accuracy import modulus_factors
     from walkers.sweeps.spread import spread_sweep
 
     refuse("CASE", not cases, "expected a case, such as fig1b")
@@ -149,7 +149,7 @@ def run(
         finished_runs = apply_all(finished_at, references)
     loaded = apply_all(case_to_run, zip(references, finished_runs, strict=True))
     if accuracy:
-        apply_all(times_of, loaded)
+        apply_all(modulus_factors, loaded)
     if spread:
         for case in loaded:
             list(spread_sweep(case, draws, engine).cases())  # refuses an unusable range

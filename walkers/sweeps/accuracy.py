@@ -70,7 +70,7 @@ def measure_accuracy(
         changes at ``half_step`` and with the ``stiffer`` beads, and the root of the sum of their squares, ``total``.
     """
     case = case_of(directory)
-    possible = times_of(case)
+    possible = modulus_factors(case)
     today = build_case(case.document, source=directory.name, name=case.name)
     if run_place(today, find_engine(engine), directory.parent).name != directory.name:
         text = "expected a run with the installed engine and program, and with the present library and bridge law"
@@ -108,7 +108,7 @@ def measure_accuracy(
     return accuracy
 
 
-def times_of(case: Case) -> Sequence[float]:
+def modulus_factors(case: Case) -> Sequence[float]:
     """Possible Young's moduli, divided by the modulus of the case; `InputError` if its error cannot be measured."""
     if not case.walkers:
         text = "no numerical error: loose beads are chaotic: their motion is different at any other time step"
