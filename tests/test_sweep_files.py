@@ -29,7 +29,7 @@ from walkers.postprocess.measure.uncertainty import SPREAD_NAME, held_text, spre
 from walkers.sweeps.record import SweepRecord
 from walkers.sweeps.scheduler import SweepOptions
 from walkers.sweeps.spread import run_spread, spread_in, spread_sweep, spread_text
-from walkers.sweeps.table import groups, key_values, table_of, thresholds
+from walkers.sweeps.table import key_values, seed_groups, table_of, thresholds
 
 Make = Callable[..., SweepDefinition]
 
@@ -286,10 +286,10 @@ def test_points_that_differ_in_their_seed_alone_are_a_group() -> None:
     }
     table = pd.DataFrame({**values, "run.seed": [1, 1, 2, 1, 3, 2], "boundary.tilt": 0.0})
     table.attrs["varied"] = list(table)
-    found = [(named, list(rows.index)) for named, rows in groups(table)]
+    found = [(named, list(rows.index)) for named, rows in seed_groups(table)]
     assert [rows for _, rows in found] == [[0, 2, 4], [1], [3, 5]]
     assert found[1][0] == {"drive.frequency": 60.0, "contact.law": 1.0}
-    ((named, rows),) = groups(table.loc[[0, 2, 4]])
+    ((named, rows),) = seed_groups(table.loc[[0, 2, 4]])
     assert (named, list(rows.index), rows.attrs["varied"]) == ({}, [0, 2, 4], list(table))
 
 
@@ -300,7 +300,7 @@ def test_a_key_may_be_a_word_at_some_points_and_a_list_at_others(
     record = SweepRecord(tmp_path / "test", sweep, [f"base-{number:012d}" for number in range(3)])
     table = table_of(record).frame
     assert key_values(table, "drive.axis") == (["x", "y", [1, 0, 1]], "")
-    assert [len(rows) for _, rows in groups(table)] == [1, 1, 1]
+    assert [len(rows) for _, rows in seed_groups(table)] == [1, 1, 1]
 
 
 def test_a_descents_thresholds_have_the_gamma0_of_their_own_drives() -> None:

@@ -32,7 +32,7 @@ from walkers.postprocess.show.drawing import (
     styled,
 )
 from walkers.rounding import percent
-from walkers.sweeps.table import SEEDS, groups, key_texts
+from walkers.sweeps.table import SEEDS, key_texts, seed_groups
 from walkers.text import aligned
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
         raise input_error(
             frame.attrs["sweep"], "expected a finished run of a pile: no point is finished"
         )
-    sets = [rows for _, rows in groups(done)]
+    sets = [rows for _, rows in seed_groups(done)]
     texts = pd.concat([key_texts(rows.head(1)) for rows in sets]).drop(
         columns=list(SEEDS), errors="ignore"
     )

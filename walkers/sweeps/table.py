@@ -235,7 +235,7 @@ def _row(number: int, sweep: SweepDefinition, state: PointState) -> dict[str, An
     }
 
 
-def groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
+def seed_groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
     """The points of a sweep's table in groups that differ in nothing but their seeds.
 
     Each has the values of the varied columns that distinguish it (none if only seeds vary), and its rows.
