@@ -1,9 +1,15 @@
-"""The table of a sweep.
+"""The table of a sweep: one row per point, with the varied keys and the numbers of the run.
 
-The table has one row per point: the varied keys and the numbers of the run. Lists, figures, reports and spreads are
-groupings and prints of it. Its ``attrs`` describe the columns (``units``, ``meanings``) and the sweep
-(``sweep``, ``title``, ``varied``: columns of the varied keys, ``axes``: keys that vary together, ``sampled``: whether
-keys that are drawn from ranges are log-uniform, ``until_below``: the speed (m/s) at which descents end, or None).
+Lists, figures, reports and spreads group and print this table; they are made elsewhere.
+
+The ``attrs`` of the data frame describe its columns and the sweep:
+
+- ``units``, ``meanings``: unit and meaning of each column
+- ``sweep``, ``title``: name and title of the sweep
+- ``varied``: the columns of the varied keys
+- ``axes``: for each axis, the keys that vary together
+- ``sampled``: for each key that is drawn from a range, whether the range is log-uniform
+- ``until_below``: the speed (m/s) below which a descent ends; None if the sweep has no descent
 """
 
 from __future__ import annotations
@@ -12,7 +18,6 @@ import io
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import nan
@@ -56,44 +61,54 @@ STATE = {
     "message": ("", "message of the failure, how much of an interrupted run is done, or empty"),
     "run": ("", "run directory, relative to the folder in which the table was written"),
 }
+"""Columns about the state of a point: their units and meanings."""
 _RESULTS = ("velocity", "climbs")
+"""Main results of walkers and of piles."""
 SIDES = ("right_facing", "left_facing")
 """Velocity columns that replace the mean if `sides_differ`."""
 FACING_DOWN = {"right_facing": "left_facing", "axial_velocity": "axial_left_facing"}
 """Columns of walkers that face down, by the columns of those that face up (`main_columns`)."""
 SEEDS = ("run.seed", "seed")
-"""Keys of the random numbers of a start: points that differ in nothing else repeat an experiment."""
+"""Keys of the random numbers of a start; points that differ only in them repeat an experiment."""
 TABLE_FORMATS = ("csv", "parquet", "json")
+"""Formats of table files, which are the endings of their names."""
 _SHOWN = {
-    *(
-        "gamma0",
-        "sin_delta",
-        "rotation_1",
-        "sliding_1",
-        "steady",
-        "walkers",
-        "upright",
-        "work",
-        "cost_of_transport",
-    ),
-    *("merged", "clustered_share", "held_share", "free_speed", "slow_share", "coverage"),
-    *(
-        "beads",
-        "large",
-        "duration",
-        "climbs",
-        "onset",
-        "speed",
-        "highest",
-        "led_by_large",
-        "clusters",
-    ),
-    *("surface_end", "brazil_nut_end", "settling"),
+    # walkers
+    "gamma0",
+    "sin_delta",
+    "rotation_1",
+    "sliding_1",
+    "steady",
+    "walkers",
+    "upright",
+    "work",
+    "cost_of_transport",
+    # walkers that meet
+    "merged",
+    "clustered_share",
+    "held_share",
+    "free_speed",
+    "slow_share",
+    "coverage",
+    # piles
+    "beads",
+    "large",
+    "duration",
+    "climbs",
+    "onset",
+    "speed",
+    "highest",
+    "led_by_large",
+    "clusters",
+    "surface_end",
+    "brazil_nut_end",
+    "settling",
 }
 """Numbers of results in the printed table, beside the main one."""
-_ASIDE = ("lost", "reason", "message")
+_NOT_PRINTED = ("lost", "reason", "message")
 """Columns of `STATE` that the printed table leaves out."""
 _MOST_FAILURES = 10
+"""Largest number of failed points whose messages are printed."""
 
 
 @dataclass(frozen=True)
@@ -127,8 +142,11 @@ class SweepTable:
 
     def results_of(self, rows: pd.DataFrame) -> list[Results]:
         """The results of some rows of the table, once for each run."""
-        results = {self.results[point].directory: self.results[point] for point in rows["point"]}
-        return list(results.values())
+        by_directory = {}
+        for point in rows["point"]:
+            result = self.results[point]
+            by_directory[result.directory] = result
+        return list(by_directory.values())
 
 
 def load_table(directory: str | Path) -> pd.DataFrame:
@@ -143,17 +161,18 @@ def load_table(directory: str | Path) -> pd.DataFrame:
     Raises
     ------
     InputError
-        If there is no sweep.
+        If the directory contains no sweep.
     """
     return table_of(read_sweep_record(directory)).frame
 
 
 def table_of(record: SweepRecord) -> SweepTable:
-    """The table of a sweep with its results, by its record."""
+    """The table of a recorded sweep, with the results of its finished points."""
     points = states(record, results=True)
-    results = {
-        number: state.result for number, state in enumerate(points) if state.result is not None
-    }
+    results = {}
+    for number, state in enumerate(points):
+        if state.result is not None:
+            results[number] = state.result
     return SweepTable(_frame(record.sweep, points), results)
 
 
@@ -166,7 +185,7 @@ def _frame(sweep: SweepDefinition, points: Sequence[PointState]) -> pd.DataFrame
     for point in points:
         numbers.update(point.result or ())
     if not all(point.result for point in points):
-        numbers.update(_declared(sweep))
+        numbers.update(_declared_numbers(sweep))
     described = {
         "point": ("", "number of the point"),
         **varied,
@@ -192,12 +211,12 @@ def _frame(sweep: SweepDefinition, points: Sequence[PointState]) -> pd.DataFrame
 def _varied_columns(sweep: SweepDefinition) -> dict[str, tuple[str, str]]:
     """Unit and meaning of the columns of the varied keys.
 
-    A key with several numbers has a column for each. If it has a word at other points, such as an
-    axis that is ``"x"`` or a direction, the words have a column too.
+    A key with several numbers has a column for each number. If the key is a word at other points,
+    such as an axis that is ``"x"`` or a direction, the words have a column too.
     """
     columns = {}
-    values_of = zip(*sweep.values, strict=True)
-    for (key, unit), values in zip(sweep.units.items(), values_of, strict=True):
+    values_by_key = zip(*sweep.values, strict=True)
+    for (key, unit), values in zip(sweep.units.items(), values_by_key, strict=True):
         lengths = [len(value) for value in values if isinstance(value, list)]
         names = [f"{key}[{part}]" for part in range(max(lengths, default=0))]
         if len(lengths) < len(values):
@@ -207,44 +226,54 @@ def _varied_columns(sweep: SweepDefinition) -> dict[str, tuple[str, str]]:
     return columns
 
 
-def _declared(sweep: SweepDefinition) -> list[str]:
-    """The numbers of results of a sweep's cases, without numbers of single beads; empty if a case cannot be read."""
-    with suppress(InputError):
-        groups = [module.NAME for module in modules_of(next(sweep.cases()))]
-        return [
-            number.name
-            for group in [*groups, "drive"]
-            for number in GROUPS[group]
-            if number.name[-1] != "*"
-        ]
-    return []
+def _declared_numbers(sweep: SweepDefinition) -> list[str]:
+    """The numbers that results of a sweep's cases have, without those of single beads.
+
+    The list is empty if the first case cannot be read.
+    """
+    try:
+        modules = modules_of(next(sweep.cases()))
+    except InputError:
+        return []
+    groups = [module.NAME for module in modules]
+    names: list[str] = []
+    for group in [*groups, "drive"]:
+        for number in GROUPS[group]:
+            name = number.name
+            if not name.endswith("*"):
+                names.append(name)
+    return names
 
 
 def _row(number: int, sweep: SweepDefinition, state: PointState) -> dict[str, Any]:
+    """The row of a point by the names of its columns."""
     row: dict[str, Any] = {"point": number, **(state.result or {})}
     for key, value in zip(sweep.keys, sweep.values[number], strict=True):
-        row |= (
-            {f"{key}[{part}]": item for part, item in enumerate(value)}
-            if isinstance(value, list)
-            else {key: value}
-        )
-    row |= {name: getattr(state, name) or "" for name in ("status", "reason", "message")}
-    return row | {
-        "lost": state.lost,
-        "run": os.path.relpath(state.directory) if state.directory else "",
-    }
+        if isinstance(value, list):
+            for part, item in enumerate(value):
+                row[f"{key}[{part}]"] = item
+        else:
+            row[key] = value
+    row["status"] = state.status
+    row["lost"] = state.lost
+    row["reason"] = state.reason or ""
+    row["message"] = state.message or ""
+    row["run"] = os.path.relpath(state.directory) if state.directory else ""
+    return row
 
 
 def seed_groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFrame]]:
-    """The points of a sweep's table in groups that differ in nothing but their seeds.
+    """Group the points of a sweep's table that differ in nothing but their seeds.
 
-    Each has the values of the varied columns that distinguish it (none if only seeds vary), and its rows.
+    Yields
+    ------
+    values : dict
+        Values of the varied columns that distinguish the group; empty if only seeds vary.
+    rows : pandas.DataFrame
+        The rows of the group.
     """
-    keys = [
-        name
-        for name in frame.attrs["varied"]
-        if name not in SEEDS and frame[name].nunique(dropna=False) > 1
-    ]
+    others = [name for name in frame.attrs["varied"] if name not in SEEDS]
+    keys = [name for name in others if frame[name].nunique(dropna=False) > 1]
     if not keys:
         yield {}, frame
         return
@@ -253,55 +282,90 @@ def seed_groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFr
 
 
 def walking_points(frame: pd.DataFrame) -> pd.DataFrame:
-    """The points of a sweep's table without those whose walkers came apart, which have no velocity."""
-    return (
-        frame[~(frame["separated_fraction"] > SEPARATED)]
-        if "separated_fraction" in frame
-        else frame
-    )
+    """The points of a sweep's table without those whose walkers came apart and have no velocity."""
+    if "separated_fraction" not in frame:
+        return frame
+    return frame[~(frame["separated_fraction"] > SEPARATED)]
 
 
 def sides_differ(frame: pd.DataFrame) -> bool:
-    """Whether walkers facing right (up) and left (down) differ at a point: then their mean velocity means nothing."""
+    """Whether walkers that face right (up) and left (down) differ at any point of a table.
+
+    If they do, their mean velocity means nothing.
+    """
     return "facings_differ" in frame and bool(frame["facings_differ"].eq(True).any())
 
 
 def main_columns(frame: pd.DataFrame) -> list[str]:
-    """The main results in order of preference: first the `headline` of a point, then `_RESULTS`."""
+    """The main results in order of preference: the `headline` of the points, then `_RESULTS`."""
     if "velocity" not in frame:
         return list(_RESULTS)
     finished: Any = frame.dropna(subset="velocity").to_dict("records")
-    heads = set(map(headline, finished))
-    return [name for name in ("axial_velocity", "right_facing") if name in heads][:1] + list(
-        _RESULTS
-    )
+    headlines = {headline(row) for row in finished}
+    for name in ("axial_velocity", "right_facing"):
+        if name in headlines:
+            return [name, *_RESULTS]
+    return list(_RESULTS)
 
 
 def default_column(frame: pd.DataFrame) -> str:
     """The column of a table that is shown by default."""
-    return next((name for name in main_columns(frame) if name in frame), "frequency")
+    for name in main_columns(frame):
+        if name in frame:
+            return name
+    return "frequency"
 
 
 def find_name(option: str, word: str, names: Iterable[str]) -> str:
-    """Find a name, or the only name that ends with ``.`` and it; `InputError` if there is none or several."""
+    """Find the name that a word means.
+
+    Parameters
+    ----------
+    option
+        The option or argument that has the word, for the message of the error.
+    word
+        A name, or its last part: what follows a point.
+    names
+        All names.
+
+    Raises
+    ------
+    InputError
+        If no name or several names end with the word.
+    """
     candidates = list(dict.fromkeys(names))
-    matches = (
-        [word] if word in candidates else [name for name in candidates if name.endswith(f".{word}")]
-    )
+    if word in candidates:
+        return word
+    matches = [name for name in candidates if name.endswith(f".{word}")]
     if len(matches) == 1:
         return matches[0]
-    text = f"expected one of {', '.join(matches or candidates)}{'' if matches else suggestion(word, candidates)}"
-    raise input_error(option, f'"{word}": {text}')
+    expected = f"expected one of {', '.join(matches or candidates)}"
+    if not matches:
+        expected += suggestion(word, candidates)
+    raise input_error(option, f'"{word}": {expected}')
 
 
 def value_text(value: Any, unit: str | None = None) -> str:
-    """A value of a key as text, with its unit unless it is a word such as auto; several are separated by slashes."""
+    """A value of a key as text; several numbers are separated by slashes.
+
+    The unit follows unless the value is a word such as auto.
+    """
     text = "/".join(map(text_of, value)) if isinstance(value, list) else text_of(value)
-    return f"{text} {unit}" if unit and not isinstance(value, str) else text
+    if unit and not isinstance(value, str):
+        return f"{text} {unit}"
+    return text
 
 
 def key_values(frame: pd.DataFrame, key: str) -> tuple[list[Any], str | None]:
-    """The values of a varied key at each point of a sweep's table, lists of keys with several numbers; their unit."""
+    """The values of a varied key at all points.
+
+    Returns
+    -------
+    values : list
+        A value for each row of the table; a list for a key with several numbers.
+    unit : str or None
+        Their unit.
+    """
     names = [name for name in frame.attrs["varied"] if name == key or name.startswith(f"{key}[")]
     rows = frame[names].astype(object)
     unit = frame.attrs["units"][names[0]]
@@ -315,150 +379,259 @@ def key_values(frame: pd.DataFrame, key: str) -> tuple[list[Any], str | None]:
 
 
 def key_texts(frame: pd.DataFrame) -> pd.DataFrame:
-    """The values of the varied keys at each point of a sweep's table as text with units; a column for each key."""
+    """The values of the varied keys as text with units: a column for each key, a row per point."""
     import pandas as pd
 
     texts = {}
-    for key in (key for axis in frame.attrs["axes"] for key in axis):
-        values, unit = key_values(frame, key)
-        texts[key] = [value_text(value, unit) for value in values]
+    for keys in frame.attrs["axes"]:
+        for key in keys:
+            values, unit = key_values(frame, key)
+            texts[key] = [value_text(value, unit) for value in values]
     return pd.DataFrame(texts, index=frame.index, dtype=object)
 
 
 def encoded(frame: pd.DataFrame, form: str) -> bytes:
-    """A sweep's table as CSV (units in the head), JSON (with units and meanings) or parquet (units in the metadata)."""
-    units, meanings = frame.attrs["units"], frame.attrs["meanings"]
+    """A sweep's table as the contents of a file, in one of `TABLE_FORMATS`.
+
+    CSV has the units in its head, JSON has units and meanings beside the points, and parquet has
+    both in the metadata of its columns.
+    """
     if form == "csv":
-        heads = [with_unit(name, units[name]) for name in frame.columns]
-        return str(frame.to_csv(index=False, header=heads)).encode()
-    if form == "json":  # not by DataFrame.to_json, which rounds to decimals
-        rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
-        return json_bytes({"units": units, "meanings": meanings, "points": rows})
+        return _csv_bytes(frame)
+    if form == "json":
+        return _json_bytes(frame)
+    return _parquet_bytes(frame)
+
+
+def _csv_bytes(frame: pd.DataFrame) -> bytes:
+    units = frame.attrs["units"]
+    heads = [with_unit(name, units[name]) for name in frame.columns]
+    return str(frame.to_csv(index=False, header=heads)).encode()
+
+
+def _json_bytes(frame: pd.DataFrame) -> bytes:
+    """The table as JSON; not by `DataFrame.to_json`, which rounds to decimals."""
+    rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
+    contents = {"units": frame.attrs["units"], "meanings": frame.attrs["meanings"], "points": rows}
+    return json_bytes(contents)
+
+
+def _parquet_bytes(frame: pd.DataFrame) -> bytes:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    # Numbers and words ("auto") become words, booleans and NaN (not finished) become booleans.
-    mixed = {
-        name: set(frame[name].map(type)) for name in frame.columns if frame[name].dtype == object
-    }
-    types = {name: "boolean" for name, kinds in mixed.items() if bool in kinds and str not in kinds}
-    types |= {name: "str" for name, kinds in mixed.items() if str in kinds and len(kinds) > 1}
-    table = pa.Table.from_pandas(frame.astype(types), preserve_index=False)
-    fields = [
-        field.with_metadata({"unit": units[field.name], "meaning": meanings[field.name]})
-        for field in table.schema
-    ]
+    units = frame.attrs["units"]
+    meanings = frame.attrs["meanings"]
+    table = pa.Table.from_pandas(frame.astype(_column_types(frame)), preserve_index=False)
+    fields = []
+    for column in table.schema:
+        metadata = {"unit": units[column.name], "meaning": meanings[column.name]}
+        fields.append(column.with_metadata(metadata))
+    schema = pa.schema(fields, metadata=table.schema.metadata)
     buffer = io.BytesIO()
-    pq.write_table(
-        table.cast(pa.schema(fields, metadata=table.schema.metadata)), buffer, compression="zstd"
-    )
+    pq.write_table(table.cast(schema), buffer, compression="zstd")
     return buffer.getvalue()
 
 
+def _column_types(frame: pd.DataFrame) -> dict[str, str]:
+    """The types of columns that hold several types, because a parquet column holds one.
+
+    Numbers and words ("auto") become words; booleans and NaN (not finished) become booleans.
+    """
+    types = {}
+    for name in frame.columns:
+        if frame[name].dtype != object:
+            continue
+        kinds = set(frame[name].map(type))
+        if str in kinds and len(kinds) > 1:
+            types[name] = "str"
+        elif bool in kinds and str not in kinds:
+            types[name] = "boolean"
+    return types
+
+
 def write_table_file(frame: pd.DataFrame, path: Path) -> None:
-    """Write a table in the format of the file's suffix; `InputError` if it is none of `TABLE_FORMATS`."""
-    if path.suffix.lstrip(".") not in TABLE_FORMATS:
+    """Write a table in the format of the path's suffix; `InputError` for an unknown suffix."""
+    form = path.suffix.lstrip(".")
+    if form not in TABLE_FORMATS:
         raise input_error(path, f"expected a name that ends in .{', .'.join(TABLE_FORMATS)}")
-    write_bytes(path, encoded(frame, path.suffix.lstrip(".")))
+    write_bytes(path, encoded(frame, form))
 
 
 def cells_of(
-    frame: pd.DataFrame, named: Callable[[str], str] | None = None
+    frame: pd.DataFrame, heading_of: Callable[[str], str] | None = None
 ) -> tuple[pd.DataFrame, str]:
-    """Varied keys, Γ0, sin δ and the main results of a table as text in mm, mm/s, nJ and degrees, with units in heads.
+    """The varied keys and the main results of a table as text, for people.
 
-    The second value has the results that are the same at all points of a sweep. Columns are called ``named``; None: by
-    the last parts of keys.
+    Numbers are in mm, mm/s, nJ and degrees; those of keys are in the unit of the sweep file.
+
+    Parameters
+    ----------
+    frame
+        A sweep's table, or its thresholds.
+    heading_of
+        The heading of a column; None: keys are called by their last parts, and other columns by
+        their names.
+
+    Returns
+    -------
+    cells : pandas.DataFrame
+        Texts, with the units in the headings.
+    same : str
+        The results that are the same at all points of a sweep, which have no column.
     """
     import pandas as pd
 
-    main = main_columns(frame)
-    shown = _SHOWN | (set(SIDES) if sides_differ(frame) else {"velocity", default_column(frame)})
-    shown |= {f"{name}_{end}" for name in main for end in ENDS.keys() - {"error"}}
-    names = [
-        name
-        for name in map(str, frame)
-        if name in shown or not (is_declared(name) or name in _ASIDE)
-    ]
-    varied, cells, same = frame.attrs["varied"], {}, []
-    kept = {"point", *varied, *main} if "status" in names else {*names}
+    names = _printed_columns(frame)
+    varied = frame.attrs["varied"]
+    always = set(names)
+    if "status" in names:  # not in a table of thresholds
+        always = {"point", *varied, *main_columns(frame)}
     short = dict(zip(varied, short_keys(varied, names), strict=True))
+    cells = {}
+    same = []
     for name in names:
-        unit, factor = frame.attrs["units"][name], 1.0
-        if name not in varied:
-            unit, factor = unit_shown(unit)
-        texts = [_cell(value, factor, unit) for value in frame[name].tolist()]
-        head, different = named(name) if named else short.get(name, name), {*texts} - {"-", ""}
-        if name in kept or len(different) > 1:
-            cells[with_unit(head, unit)] = texts
+        heading = heading_of(name) if heading_of else short.get(name, name)
+        texts, unit = _column_texts(frame, name)
+        different = set(texts) - {"-", ""}
+        if name in always or len(different) > 1:
+            cells[with_unit(heading, unit)] = texts
         elif different and name != "status":
-            same.append(f"{head} {different.pop()} {unit}".rstrip())
+            same.append(f"{heading} {different.pop()} {unit}".rstrip())
     return pd.DataFrame(cells), ", ".join(same)
 
 
+def _printed_columns(frame: pd.DataFrame) -> list[str]:
+    """Names of the columns that may be printed: no further numbers of results, and no messages."""
+    printed = set(_SHOWN)
+    if sides_differ(frame):
+        printed.update(SIDES)
+    else:
+        printed.update(("velocity", default_column(frame)))
+    for name in main_columns(frame):
+        for end in ENDS:
+            if end != "error":
+                printed.add(f"{name}_{end}")
+    names = []
+    for name in map(str, frame):
+        is_result = is_declared(name)
+        if name in printed or not (is_result or name in _NOT_PRINTED):
+            names.append(name)
+    return names
+
+
+def _column_texts(frame: pd.DataFrame, name: str) -> tuple[list[str], str]:
+    """The texts of a column, and their unit."""
+    unit = frame.attrs["units"][name]
+    factor = 1.0
+    if name not in frame.attrs["varied"]:
+        unit, factor = unit_shown(unit)
+    return [_cell(value, factor, unit) for value in frame[name].tolist()], unit
+
+
 def _cell(value: Any, factor: float, unit: str) -> str:
+    """A value as text: a number is multiplied by the factor, which makes it one of the unit."""
     if isinstance(value, (bool, str)):
         return str(value)
-    return "-" if value is None else rounded(value if factor == 1.0 else value * factor, unit)
+    if value is None:
+        return "-"
+    if factor == 1.0:  # whole numbers stay whole
+        return rounded(value, unit)
+    return rounded(value * factor, unit)
 
 
 def short_text(frame: pd.DataFrame) -> str:
-    """`cells_of` a table as text, with a line below for the results that are the same at all points."""
+    """The `cells_of` a table, with a line below for the results that are the same at all points."""
     cells, same = cells_of(frame)
     text = aligned([[*cells], *cells.to_numpy().tolist()], right=range(len(cells.columns)))
-    return f"{text}\n\nthe same at all points: {same}" if same else text
+    if same:
+        text += f"\n\nthe same at all points: {same}"
+    return text
 
 
 def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
-    """The ends of the descents in a sweep's table, a row each; `InputError` if it has none.
+    """The ends of the descents in a sweep's table.
 
-    Values of the lowered key: the last one at which the walkers move, and the first one at which they rest, with the
-    dimensionless peak forces Γ0 there; NaN where there is none.
+    Returns
+    -------
+    pandas.DataFrame
+        A row for each descent. Beside the other varied keys, ``moving`` is the last value of the
+        lowered key at which the walkers move, and ``at_rest`` the first one at which they rest.
+        ``gamma0_moving`` and ``gamma0_at_rest`` are the dimensionless peak forces Γ0 there. NaN
+        where no such point is finished.
+
+    Raises
+    ------
+    InputError
+        If the sweep has no descent.
     """
     import pandas as pd
 
-    if (until_below := frame.attrs["until_below"]) is None:
+    if frame.attrs["until_below"] is None:
         raise input_error(
             frame.attrs["sweep"], "the sweep has no descent and therefore no thresholds"
         )
-    *kept, lowered = frame.attrs["varied"]
+    *other_keys, lowered = frame.attrs["varied"]
     rows = []
     for _, points in frame.groupby(frame["point"] // frame[lowered].nunique()):
-        finished = points[points["status"] == "finished"]
-        slow = finished["velocity"].astype(float).abs() < until_below
-        row = {name: points.iloc[0][name] for name in kept}
-        for name, part in (
-            ("moving", finished[~slow.cummax()].tail(1)),
-            ("at_rest", finished[slow].head(1)),
-        ):
-            row[name] = part.iloc[0][lowered] if len(part) else nan
-            row[f"gamma0_{name}"] = part.iloc[0]["gamma0"] if len(part) else nan
+        row = {name: points.iloc[0][name] for name in other_keys}
+        row |= _threshold(points, lowered, frame.attrs["until_below"])
         rows.append(row)
-    table, units = pd.DataFrame(rows), frame.attrs["units"]
-    ends = {
-        "moving": units[lowered],
+    table = pd.DataFrame(rows)
+    units = {name: frame.attrs["units"][name] for name in other_keys}
+    units |= {
+        "moving": frame.attrs["units"][lowered],
         "gamma0_moving": "",
-        "at_rest": units[lowered],
+        "at_rest": frame.attrs["units"][lowered],
         "gamma0_at_rest": "",
     }
-    table.attrs |= {"units": {name: units[name] for name in kept} | ends, "varied": kept}
+    table.attrs["units"] = units
+    table.attrs["varied"] = other_keys
     return table
+
+
+def _threshold(points: pd.DataFrame, lowered: str, until_below: float) -> dict[str, float]:
+    """The last value of the lowered key at which walkers move, and the first at which they rest.
+
+    Parameters
+    ----------
+    points
+        The points of one descent.
+    lowered
+        The key that the descent lowers.
+    until_below
+        Speed in m/s below which walkers are at rest.
+    """
+    finished = points[points["status"] == "finished"]
+    slow = finished["velocity"].astype(float).abs() < until_below
+    ends = {
+        "moving": finished[~slow.cummax()].tail(1),
+        "at_rest": finished[slow].head(1),
+    }
+    numbers = {}
+    for name, end in ends.items():
+        numbers[name] = nan
+        numbers[f"gamma0_{name}"] = nan
+        if len(end):
+            numbers[name] = end.iloc[0][lowered]
+            numbers[f"gamma0_{name}"] = end.iloc[0]["gamma0"]
+    return numbers
 
 
 def describe_status(frame: pd.DataFrame) -> str:
     """Numbers of points by status, failures with their messages, and the thresholds of descents."""
-    lines = [
-        f"{frame.attrs['sweep']}: {counted(len(frame), 'point')}, {status_text(Counter(frame['status'])) or 'none'}"
-    ]
+    statuses = status_text(Counter(frame["status"])) or "none"
+    lines = [f"{frame.attrs['sweep']}: {counted(len(frame), 'point')}, {statuses}"]
     failed = frame[frame["status"] == "failed"]
-    lines += [
-        f"  failed     point {row.point}: {row.message}"
-        for row in failed[:_MOST_FAILURES].itertuples()
-    ]
+    for row in failed[:_MOST_FAILURES].itertuples():
+        point = f"  failed     point {row.point}"
+        lines.append(f"{point}: {row.message}")
     if len(failed) > _MOST_FAILURES:
         lines.append(f"             and {len(failed) - _MOST_FAILURES} more")
-    begun = frame[(frame["status"] == "missing") & (frame["message"] != "")]
-    lines += [f"  interrupted  point {row.point}: {row.message}" for row in begun.itertuples()]
+    interrupted = frame[(frame["status"] == "missing") & (frame["message"] != "")]
+    for row in interrupted.itertuples():
+        point = f"  interrupted  point {row.point}"
+        lines.append(f"{point}: {row.message}")
     if frame.attrs["until_below"] is not None:
         lines += [f"  {line}" for line in short_text(thresholds(frame)).splitlines()]
     return "\n".join(lines)
