@@ -51,7 +51,7 @@ from walkers.postprocess.show.drawing import (
     styled,
 )
 from walkers.second_engine.lines import as_dict, failures, run_checks
-from walkers.sweeps.climbing import texts_of
+from walkers.sweeps.climbing_output import texts_of
 from walkers.sweeps.scheduler import SweepOptions
 from walkers.templates.deck import CONTENT_VERSION
 

@@ -22,13 +22,11 @@ from walkers.inputs.reading import shipped
 from walkers.sweeps.climbing import (
     PARTS,
     climb_summary,
-    climbing_table,
-    climbs_figure,
     conditions_in,
     leaders,
     survival,
-    texts_of,
 )
+from walkers.sweeps.climbing_output import climbing_table, climbs_figure, texts_of
 
 BEADS, LARGE, LENGTH = 20, 4, 10.0
 CLIMB: dict[str, Any] = {

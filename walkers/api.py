@@ -54,7 +54,8 @@ from walkers.runs.names import (
 from walkers.runs.status import state_at, worst_status
 from walkers.sweeps import table as of_points
 from walkers.sweeps.accuracy import measure_accuracy
-from walkers.sweeps.climbing import conditions_in, summarise_climbs, write_climbs
+from walkers.sweeps.climbing import conditions_in, summarise_climbs
+from walkers.sweeps.climbing_output import write_climbs
 from walkers.sweeps.figure import column_of, figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.record import SweepRecord, read_sweep_record

@@ -199,7 +199,7 @@ def climb(
     to
         Write the figure (.png, .svg, .pdf) or the table (.csv) to this file.
     """
-    from walkers.sweeps.climbing import describe_climbs
+    from walkers.sweeps.climbing_output import describe_climbs
 
     refuse("RUN|SWEEP", not names, "expected sweeps, runs or cases of piles")
     climbs = walkers.climb(names, lookup.out, lookup.values, within=within, to=to)

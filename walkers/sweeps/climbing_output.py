@@ -1,0 +1,284 @@
+"""Statistics of climbs (`walkers.sweeps.climbing`) as text, table and figure."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from walkers.files import write_bytes
+from walkers.postprocess.show.drawing import (
+    TWO_COLUMNS,
+    letter_panels,
+    new_figure,
+    plain_text,
+    save_figure,
+    styled,
+)
+from walkers.rounding import percent
+from walkers.sweeps.climbing import CONFIDENCE, DRAWS, PARTS, WALLS_OF_CORNER
+from walkers.text import aligned
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class _Subset:
+    """Some of the climbs, which table and figure tell apart.
+
+    Attributes
+    ----------
+    label
+        What the table and the legend call them.
+    key
+        Their key in the results of `walkers.sweeps.climbing.climb_summary`; empty for all climbs.
+    look
+        Matplotlib's format: colour and marker.
+    """
+
+    label: str
+    key: str
+    look: str
+
+    def numbers_in(self, condition: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The statistics of these climbs in a condition."""
+        if self.key:
+            numbers: Mapping[str, Any] = condition[self.key]
+            return numbers
+        return condition
+
+
+_ALL = _Subset(label="all", key="", look="ko")
+_ON_PLAIN_WALLS = _Subset(label="plain walls", key="on_plain_walls", look="C1s")
+_IN_CORNERS = _Subset(label="corners", key="in_corners", look="C2^")
+_SUBSETS = (_ALL, _ON_PLAIN_WALLS, _IN_CORNERS)
+_MISSING = "–"
+"""Text of a statistic that does not exist, such as the speed if nothing climbed."""
+_ROW_HEIGHT = 2.1
+"""Height of the first row of panels, inches."""
+_LETTERS_OF_LABEL = 44
+"""Letters of a line in the labels of conditions."""
+
+
+def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
+    """Statistics of the climbs in a condition as texts by their names.
+
+    Rates are in climbs per run and second; 95 % confidence intervals are in brackets.
+    """
+    p_by_chance = climbs["p_among_beads"]
+    if p_by_chance is not None:  # the draws show no smaller probability
+        p_by_chance = max(p_by_chance, 2.0 / DRAWS)
+    median_speed = None
+    if climbs["speeds"]:
+        median_speed = 1e3 * np.median(climbs["speeds"])
+    texts = {
+        "pile": climbs["condition"],
+        "climbed": f"{climbs['climbed']} of {climbs['runs']}",
+        "within (s)": f"{climbs['within']:.3g}",
+        "ended before": f"{climbs['ended']}",
+        "probability": _with_interval(climbs["probability"], climbs["interval"], ".2f"),
+        "half by (s)": _two_digits(climbs["median"]),
+        "climbs": f"{climbs['climbs']}",
+        "rate": _with_interval(climbs["rate"], climbs["rate_interval"], ".2g"),
+    }
+    for part in PARTS:
+        rate = _with_interval(climbs[part]["rate"], climbs[part]["rate_interval"], ".2g")
+        texts[part.replace("_", " ")] = rate
+    texts |= {
+        "dispersion": _two_digits(climbs["dispersion"]),
+        "led by large": f"{climbs['led_by_large']} of {climbs['climbs']}",
+        "large beads (%)": f"{100.0 * climbs['share_of_large']:.0f}",
+        "p by chance": _two_digits(p_by_chance),
+        "beads": _range_text(climbs["sizes"]),
+        "height (mm)": _range_text(climbs["heights"], 1e3),
+        "speed (mm/s)": _range_text(climbs["speeds"], 1e3),
+        "median speed (mm/s)": _two_digits(median_speed),
+        "guessed": ", ".join(climbs.get("guessed", [])) or _MISSING,
+    }
+    return texts
+
+
+def _two_digits(value: float | None) -> str:
+    """A number with two significant digits."""
+    return _MISSING if value is None else f"{value:.2g}"
+
+
+def _with_interval(value: float | None, interval: Sequence[float] | None, digits: str) -> str:
+    """A number in a format, with its interval in brackets if there is one."""
+    if value is None:
+        return _MISSING
+    text = f"{value:{digits}}"
+    if interval is not None:
+        low, high = interval
+        text += f" ({low:{digits}} to {high:{digits}})"
+    return text
+
+
+def _range_text(values: Sequence[float], factor: float = 1.0) -> str:
+    """The smallest and the largest value, multiplied by a factor of the unit."""
+    if not values:
+        return _MISSING
+    return f"{factor * min(values):.2g} to {factor * max(values):.2g}"
+
+
+def describe_climbs(climbs: Sequence[Mapping[str, Any]]) -> str:
+    """The `texts_of` several conditions, one below the other, without what does not exist."""
+    blocks = []
+    for condition in climbs:
+        texts = texts_of(condition)
+        rows = [[name, text] for name, text in texts.items() if text != _MISSING]
+        blocks.append(aligned(rows))
+    note = f"rates per run and second; in brackets {percent(CONFIDENCE)} confidence"
+    return "\n\n".join([*blocks, note])
+
+
+def climbing_table(climbs: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """The results of `walkers.api.climb` as a table in SI units.
+
+    Returns
+    -------
+    pandas.DataFrame
+        For each ``condition`` a row for all climbs, for those on plain walls and for those in
+        corners (``where``). The ends of intervals have columns of their own, such as ``rate_low``
+        and ``rate_high``; NaN where there is no interval.
+    """
+    import pandas as pd
+
+    rows = []
+    for condition in climbs:
+        for subset in _SUBSETS:
+            row = {"condition": condition["condition"], "where": subset.label}
+            row |= _table_row(subset.numbers_in(condition))
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _table_row(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """The statistics of climbs in a row: without lists, and with the ends of intervals."""
+    row = {}
+    for name, value in numbers.items():
+        if name.endswith("interval"):
+            quantity = name.removesuffix("interval").strip("_") or "probability"
+            low, high = value or (np.nan, np.nan)
+            row[f"{quantity}_low"] = low
+            row[f"{quantity}_high"] = high
+        elif not isinstance(value, (dict, list)):
+            row[name] = value
+    return row
+
+
+@styled
+def climbs_figure(climbs: Sequence[Mapping[str, Any]]) -> Figure:
+    """Draw the results of `walkers.api.climb`.
+
+    The first row shows the first condition: the share of piles that have climbed by a time (Kaplan
+    and Meier's estimate), and speeds against sizes. Below are the rates of all conditions with
+    their exact 95 % intervals, and the number of piles that climbed.
+    """
+    heights = [1.0, 0.3 + len(climbs) / 6.0]
+    mosaic = [["survival", "climbs"], ["rates", "rates"]]
+    figure, axes = new_figure(
+        TWO_COLUMNS, _ROW_HEIGHT * sum(heights), mosaic=mosaic, height_ratios=heights
+    )
+    _draw_survival(axes["survival"], climbs[0]["curve"])
+    _draw_speeds(axes["climbs"], climbs[0]["each"])
+    _draw_rates(axes["rates"], climbing_table(climbs))
+    letter_panels(axes.values())
+    handles, labels = axes["rates"].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(_SUBSETS))
+    return figure
+
+
+def _draw_survival(axes: Axes, curve: Mapping[str, Sequence[float | None]]) -> None:
+    """The share of piles that have climbed against the time of the drive, with its band."""
+    time = np.array(curve["time"], dtype=float)
+    share = np.array(curve["probability"], dtype=float)
+    low = np.array(curve["low"], dtype=float)
+    high = np.array(curve["high"], dtype=float)
+    axes.step(time, share, "k", where="post")
+    axes.fill_between(time, low, high, step="post", color="0.85")
+    axes.set(
+        xlabel="time of drive (s)",
+        ylabel="share that has climbed",
+        ylim=(0.0, 1.02),
+        xlim=(0.0, None),
+    )
+
+
+def _draw_speeds(axes: Axes, climbs: Sequence[Mapping[str, Any]]) -> None:
+    """Speeds of climbs in mm/s against their sizes, on plain walls and in corners."""
+    for subset in (_ON_PLAIN_WALLS, _IN_CORNERS):
+        sizes = []
+        speeds = []
+        for climb in climbs:
+            belongs = _is_in_corner(climb) == (subset is _IN_CORNERS)
+            if belongs and climb["speed"] is not None:
+                sizes.append(climb["size"])
+                speeds.append(climb["speed"] * 1e3)
+        axes.plot(
+            sizes,
+            speeds,
+            subset.look,
+            label=subset.label,
+            markerfacecolor="none",
+            clip_on=False,
+            in_layout=False,  # without climbs a layout would fail
+        )
+    axes.set(xlabel="beads", ylabel="speed (mm/s)", xlim=(0.0, None), ylim=(0.0, None))
+
+
+def _is_in_corner(climb: Mapping[str, Any]) -> bool:
+    """Whether two or more side walls hold a climb."""
+    return bool(climb["walls"] >= WALLS_OF_CORNER)
+
+
+def _draw_rates(axes: Axes, table: pd.DataFrame) -> None:
+    """Rates with their exact intervals, one condition below the other."""
+    for number, subset in enumerate(_SUBSETS):
+        rows = table[table["where"] == subset.label]
+        places = np.arange(len(rows)) + 0.2 * (number - 1)
+        rates = rows["rate"].astype(float)  # NaN without a drive
+        errors = [rates - rows["rate_low"], rows["rate_high"] - rates]
+        axes.errorbar(
+            rates,
+            places,
+            xerr=errors,
+            fmt=subset.look,
+            label=subset.label,
+            linestyle="none",
+            markersize=3.0,
+        )
+    labels = []
+    for row in table[table["where"] == _ALL.label].to_dict("records"):
+        # The condition with the last word of each key, such as ``frequency 100 Hz``.
+        condition = re.sub(r"[\w.\[\]]*?(\w+) = ", r"\1 ", row["condition"])
+        label = f"{condition}: {row['climbed']}/{row['runs']} climbed"
+        labels.append(plain_text(fill(label, _LETTERS_OF_LABEL)))
+    axes.set_yticks(range(len(labels)), labels)
+    axes.set(xlabel="climbs per run and second", xlim=(0.0, None), ylim=(len(labels) - 0.5, -0.5))
+
+
+def write_climbs(climbs: Sequence[Mapping[str, Any]], runs: Sequence[str], to: Path) -> None:
+    """Write the results of `walkers.api.climb` to a file.
+
+    Parameters
+    ----------
+    climbs
+        The results.
+    runs
+        Names of the runs, which are recorded in a figure.
+    to
+        The file: a table (.csv, SI units), or a figure.
+    """
+    if to.suffix == ".csv":
+        write_bytes(to, climbing_table(climbs).to_csv(index=False).encode())
+    else:
+        save_figure(climbs_figure(climbs), to, runs, [to.suffix[1:]], "How often piles climb")
