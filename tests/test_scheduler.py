@@ -44,20 +44,17 @@ from walkers.runner.binary import find_engine
 from walkers.runner.failures import WalkersMet
 from walkers.runner.run_directory import case_of, unfinished
 from walkers.runs.making import DECK_FOLDER, make_runs, progress_at
+from walkers.sweeps.packing import LONGEST_SECONDS, MOST_WALKERS, makespan, pack
 from walkers.sweeps.record import write_record
 from walkers.sweeps.scheduler import (
-    LONGEST_SECONDS,
-    MOST_WALKERS,
     SweepOptions,
     SweepReplacedWarning,
-    SweepStopped,
-    makespan,
-    pack,
     plan_sweep,
     run_sweep,
 )
 from walkers.sweeps.site import check_path, decks_at, load_site, prepare
 from walkers.sweeps.table import load_table, thresholds
+from walkers.sweeps.workers import SweepStopped
 from walkers.templates.deck import LAYOUT_NAME, OUTPUT_NAME, compose, plan_of
 from walkers.templates.placement import sharing_key
 

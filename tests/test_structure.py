@@ -42,7 +42,7 @@ TEXTS = {
 """Attributes that are sentences, or hold them."""
 ALLOWED = {
     # Parsl repeats its first error, and has no other form of it.
-    ("walkers/sweeps/scheduler.py", "str(error).partition('Error 2:')"),
+    ("walkers/sweeps/workers.py", "str(error).partition('Error 2:')"),
     # A label with a place for the number of a bead, such as "rotation of bead *".
     (
         "walkers/postprocess/measure/quantities.py",

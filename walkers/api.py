@@ -60,9 +60,10 @@ from walkers.sweeps.figure import column_of, figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.record import SweepRecord, read_sweep_record
 from walkers.sweeps.report import report_sweep
-from walkers.sweeps.scheduler import Failure, SweepOptions, run_sweep
+from walkers.sweeps.scheduler import SweepOptions, run_sweep
 from walkers.sweeps.site import load_site
 from walkers.sweeps.spread import Spread, figures_of_spread, run_spread
+from walkers.sweeps.workers import Failure
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor

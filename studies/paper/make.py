@@ -15,7 +15,8 @@ from walkers.extras import require
 from walkers.files import write_bytes, write_json
 from walkers.postprocess.show.drawing import check_formats, save_figure
 from walkers.progress import progress_of
-from walkers.sweeps.scheduler import Failure, SweepOptions, run_sweep
+from walkers.sweeps.scheduler import SweepOptions, run_sweep
+from walkers.sweeps.workers import Failure
 from walkers.text import rendered
 
 if TYPE_CHECKING:

@@ -23,8 +23,9 @@ from walkers.extras import require
 from walkers.inputs.axes import unit_cube
 from walkers.progress import progress_of
 from walkers.runner.failures import BeadsLost, BlowUp
-from walkers.sweeps.scheduler import Failure, SweepOptions, run_sweep
+from walkers.sweeps.scheduler import SweepOptions, run_sweep
 from walkers.sweeps.table import load_table
+from walkers.sweeps.workers import Failure
 
 if TYPE_CHECKING:
     import pandas as pd

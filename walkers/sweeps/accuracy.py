@@ -25,8 +25,9 @@ from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME
 from walkers.progress import Tell
 from walkers.runner.binary import find_engine
 from walkers.runner.run_directory import case_of, recomputed, run_place
-from walkers.sweeps.scheduler import SweepOptions, SweepStopped, run_sweep
+from walkers.sweeps.scheduler import SweepOptions, run_sweep
 from walkers.sweeps.table import SIDES, main_columns, sides_differ, table_of
+from walkers.sweeps.workers import SweepStopped
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -37,8 +37,9 @@ from walkers.sweeps.correlations import rank_correlations
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.left_out import LeftOutWarning
 from walkers.sweeps.record import read_sweep_record
-from walkers.sweeps.scheduler import Failure, SweepOptions, run_sweep
+from walkers.sweeps.scheduler import SweepOptions, run_sweep
 from walkers.sweeps.table import main_columns, table_of, walking_points
+from walkers.sweeps.workers import Failure
 
 if TYPE_CHECKING:
     import pandas as pd

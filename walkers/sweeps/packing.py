@@ -1,0 +1,162 @@
+"""Pack the points of a sweep into decks.
+
+Each deck has a start-up time and a cost per step that do not depend on its contents: few decks are
+cheaper. Many decks use the cores more evenly and give results sooner. Decks are packed by their
+predicted cost, so that all cores finish together.
+
+The packing depends on the whole sweep and the number of workers, not on the finished points: an
+interrupted sweep continues with the same decks.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Collection, Hashable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil
+
+from walkers.inputs.tables.case import Case
+from walkers.runner.cost import pairs_of_beads, predicted_seconds
+from walkers.templates.placement import sharing_key
+
+MOST_WALKERS = 96
+"""Limit for a deck; with 96 walkers the cost of the deck itself is 4 % of the total."""
+MOST_POINTS = 64
+"""Limit for a deck."""
+LONGEST_SECONDS = 60.0
+"""Limit of the predicted time of a deck of several points, so that results appear regularly."""
+_TRIALS = 24
+"""Number of plans that are compared; each has decks that are 2^(1/4) times shorter."""
+_AS_GOOD = 1.02
+"""Plans that take at most this many times as long as the fastest one are equally good."""
+
+
+@dataclass(frozen=True)
+class PlannedDeck:
+    """Points that one deck makes.
+
+    Attributes
+    ----------
+    points
+        Numbers of the points, in order.
+    seconds
+        Predicted time on one core, s.
+    """
+
+    points: tuple[int, ...]
+    seconds: float
+
+    @classmethod
+    def of_points(cls, points: Sequence[int], cases: Sequence[Case]) -> PlannedDeck:
+        """The deck of some points of a sweep with these cases."""
+        walkers = sum(pairs_of_beads(cases[number]) for number in points)
+        return cls(tuple(points), predicted_seconds(cases[points[0]], walkers))
+
+
+def pack(
+    cases: Sequence[Case], workers: int, longest_seconds: float = LONGEST_SECONDS
+) -> list[PlannedDeck]:
+    """Pack points into decks; the longest decks come first.
+
+    Parameters
+    ----------
+    cases
+        The cases of all points of a sweep.
+    workers
+        Number of decks that run at the same time.
+    longest_seconds
+        Largest predicted time of a deck of several points, s.
+    """
+    points_by_key: dict[Hashable, list[int]] = {}
+    for number, case in enumerate(cases):
+        points_by_key.setdefault(sharing_key(case), []).append(number)
+    groups = list(points_by_key.values())
+    whole = sum(PlannedDeck.of_points(group, cases).seconds for group in groups)
+    longest = max(PlannedDeck.of_points([number], cases).seconds for number in range(len(cases)))
+    trials = _TRIALS if len(groups) < len(cases) else 1
+    plans = []
+    spans = []
+    for trial in range(trials):
+        length = min(2.0 * max(whole / workers, longest) * 2.0 ** (-trial / 4), longest_seconds)
+        decks: list[PlannedDeck] = []
+        for group in groups:
+            decks += _split_group(group, cases, length)
+        plans.append(decks)
+        spans.append(makespan([deck.seconds for deck in decks], workers))
+    good = [number for number, span in enumerate(spans) if span <= _AS_GOOD * min(spans)]
+    smallest_decks = plans[max(good)]
+    return sorted(smallest_decks, key=lambda deck: -deck.seconds)
+
+
+def _split_group(
+    group: Sequence[int], cases: Sequence[Case], longest_seconds: float
+) -> list[PlannedDeck]:
+    """The smallest number of decks for points that can share a deck.
+
+    The limits of a deck do not apply to one of a single point.
+    """
+    most_walkers = max(pairs_of_beads(cases[number]) for number in group)
+
+    def is_possible(points: int) -> bool:
+        walkers = points * most_walkers
+        seconds = predicted_seconds(cases[group[0]], walkers)  # a group shares the number of steps
+        is_small = points <= MOST_POINTS and walkers <= MOST_WALKERS
+        return points == 1 or (is_small and seconds <= longest_seconds)
+
+    decks = 1
+    while not is_possible(ceil(len(group) / decks)):
+        decks += 1
+    return [PlannedDeck.of_points(part, cases) for part in parts_of(group, decks)]
+
+
+def parts_of(points: Sequence[int], count: int) -> list[Sequence[int]]:
+    """Split a sequence into consecutive parts whose lengths differ by at most one."""
+    edges = [len(points) * number // count for number in range(count + 1)]
+    return [points[start:end] for start, end in pairwise(edges)]
+
+
+def makespan(seconds: Iterable[float], workers: int) -> float:
+    """Time in s until all decks are done, if each free worker takes the longest deck that is left.
+
+    Parameters
+    ----------
+    seconds
+        Times of the decks, s.
+    workers
+        Number of decks that run at the same time.
+    """
+    durations = sorted(seconds, reverse=True)
+    ends = [0.0] * max(1, min(workers, len(durations)))
+    for duration in durations:
+        heapq.heapreplace(ends, ends[0] + duration)
+    return max(ends)
+
+
+def unfinished_parts(
+    points: Sequence[int], cases: Sequence[Case], finished: Collection[int]
+) -> list[PlannedDeck]:
+    """The unfinished part of a deck as decks.
+
+    It is the deck itself, or its largest halves, quarters, … without a finished point. A deck that
+    fails is repeated as two halves. So the same decks are left whenever the sweep is interrupted.
+
+    Parameters
+    ----------
+    points
+        Numbers of the points of the deck.
+    cases
+        The cases of all points of the sweep.
+    finished
+        Numbers of the finished points of the sweep.
+    """
+    done = [number in finished for number in points]
+    if not any(done):
+        return [PlannedDeck.of_points(points, cases)]
+    if all(done):
+        return []
+    first, second = parts_of(points, 2)
+    return [
+        *unfinished_parts(first, cases, finished),
+        *unfinished_parts(second, cases, finished),
+    ]
