@@ -1,14 +1,15 @@
-"""Numerical errors of walkers: the same case at half the time step, and with harder beads until nothing changes.
+"""Numerical errors of walkers: the case at half the time step, and with harder beads.
 
-Beads are softer than their material, so that the time step can be longer. Young's modulus is multiplied by 4 and the
-time step halved, as the Rayleigh limit allows it, until the headline velocities change by less than a share; the last
-increase is to the largest modulus of a case, that of hard materials. Velocities follow no common power of the modulus
-(docs/explanation/physics.md), so nothing is extrapolated.
+Beads are softer than their material, so that the time step can be longer. Young's modulus is
+multiplied by 4 and the time step halved, as the Rayleigh limit allows it, until the headline
+velocities change by less than a share; the last increase is to the largest modulus of a case, that
+of hard materials. Velocities follow no common power of the modulus (docs/explanation/physics.md),
+so nothing is extrapolated.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import hypot, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,10 +35,10 @@ if TYPE_CHECKING:
 
 SHARE = 0.01
 """Share of a velocity that the last increase of Young's modulus may change."""
-_TIMES = (1.0, 4.0, 16.0, 64.0, 256.0)
-"""Young's moduli, divided by the modulus of the case. A run with the largest one takes 16 times as long."""
+_MODULUS_FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0)
+"""Young's moduli, divided by the modulus of the case. The largest one takes 16 times as long."""
 _LEAST_INCREASE = 1.25
-"""Of the modulus, to the largest of a case."""
+"""Smallest factor of a last increase of the modulus, to the largest one of a case."""
 _FAMILIES = (
     "velocity",
     "right_facing",
@@ -57,93 +58,177 @@ def measure_accuracy(
     engine: str | None = None,
     on_progress: Tell | None = None,
 ) -> dict[str, Any]:
-    """Make the runs that measure the numerical errors of a finished run, and record the errors in the run.
+    """Make the runs that measure the numerical errors of a finished run, and record the errors.
 
-    Finished runs are used again. Other arguments: see `walkers.sweeps.scheduler.run_sweep`. `InputError` if the run is
-    none of walkers or not of the installed engine; `SweepStopped` if a run fails.
+    Finished runs are used again.
+
+    Parameters
+    ----------
+    directory
+        Directory of a finished run of walkers, beside which the further runs are made.
+    options, engine, on_progress
+        As of `walkers.sweeps.scheduler.run_sweep`.
 
     Returns
     -------
     dict
-        Contents of ``accuracy.json``: ``sweep``, its name beside the run; ``times``, the largest modulus divided by the
-        modulus of the case, 1 if its beads cannot be harder; ``change``, the relative change of a velocity by the last
-        increase, and whether it is below the ``share`` (``reached``). ``errors`` has for each number, in m/s, the
-        changes at ``half_step`` and with the ``stiffer`` beads, and the root of the sum of their squares, ``total``.
+        Contents of the file ``accuracy.json`` in the run:
+
+        - ``sweep``: name of the sweep beside the run
+        - ``share``: the largest change of a headline velocity that is accepted, relative to it
+        - ``reached``: whether the change is smaller
+        - ``change``: the change by the last increase of Young's modulus
+        - ``times``: the largest modulus, divided by the modulus of the case; 1 if its beads cannot
+          be harder
+        - ``errors``: for each number, in m/s, the changes at half the time step (``half_step``) and
+          with the hardest beads (``stiffer``), and the root of the sum of their squares
+          (``total``)
+
+    Raises
+    ------
+    InputError
+        If the run is not one of walkers, or was not made by the installed engine and program.
+    SweepStopped
+        If a run fails.
     """
     case = case_of(directory)
     possible = modulus_factors(case)
-    today = build_case(case.document, source=directory.name, name=case.name)
-    if run_place(today, find_engine(engine), directory.parent).name != directory.name:
-        text = "expected a run with the installed engine and program, and with the present library and bridge law"
-        raise input_error(directory.name, f"{text}; run its case again")
+    _check_is_current(case, directory, engine)
     numbers = recorded(directory)["numbers"]
     for last in range(min(2, len(possible) - 1), len(possible)):
-        sweep = _sweep(case, f"{directory.name}{ACCURACY}", possible[: last + 1])
+        sweep = _convergence_sweep(case, f"{directory.name}{ACCURACY}", possible[: last + 1])
         record, failures = run_sweep(
             sweep, directory.parent, options, engine=engine, on_progress=on_progress
         )
         if failures:
             raise SweepStopped(f"{failures[0].run}: {failures[0].message}")
         table = table_of(record).frame
-        # The largest share of a headline velocity that the last increase of the modulus changes.
-        names = {
-            main_columns(table)[0],
-            *(SIDES if case.goes_uphill or sides_differ(table) else ()),
-        }
-        harder = [numbers, *table[1:].to_dict("records")]
-        before, after = harder[max(last - 1, 0)], harder[last]
-        changes = (
-            abs(after[name] - before[name]) / max(abs(after[name]), STEADY_SPEED) for name in names
-        )
-        if (change := float(max(filter(isfinite, changes)))) < SHARE:
+        by_modulus = [numbers, *table[1:].to_dict("records")]
+        before = by_modulus[max(last - 1, 0)]
+        hardest = by_modulus[last]
+        change = _largest_change(before, hardest, _headline_velocities(case, table))
+        if change < SHARE:
             break
     accuracy = {
         "sweep": record.sweep.name,
         "share": SHARE,
         "reached": change < SHARE,
         "change": change,
+        "times": possible[last],
+        "errors": _errors(numbers, table.iloc[0], hardest),
     }
-    accuracy |= {"times": possible[last], "errors": _errors(numbers, table.iloc[0], harder[last])}
     with recomputed(directory, [ACCURACY_NAME]):
         write_json(directory / ACCURACY_NAME, accuracy)
     return accuracy
 
 
-def modulus_factors(case: Case) -> Sequence[float]:
-    """Possible Young's moduli, divided by the modulus of the case; `InputError` if its error cannot be measured."""
-    if not case.walkers:
-        text = "no numerical error: loose beads are chaotic: their motion is different at any other time step"
+def _check_is_current(case: Case, directory: Path, engine: str | None) -> None:
+    """Refuse a run that the installed engine and program would not make from its case file."""
+    today = build_case(case.document, source=directory.name, name=case.name)
+    if run_place(today, find_engine(engine), directory.parent).name != directory.name:
         raise input_error(
-            case.name, f"{text}; walkers climb gives the scatter over starts (run.seed)"
+            directory.name,
+            "expected a run with the installed engine and program, and with the present library "
+            "and bridge law; run its case again",
+        )
+
+
+def modulus_factors(case: Case) -> Sequence[float]:
+    """Possible Young's moduli, divided by the modulus of the case, in ascending order.
+
+    Raises
+    ------
+    InputError
+        If the numerical error of the case cannot be measured, because it has no walkers.
+    """
+    if not case.walkers:
+        raise input_error(
+            case.name,
+            "no numerical error: loose beads are chaotic: their motion is different at any other "
+            "time step; walkers climb gives the scatter over starts (run.seed)",
         )
     hardest = STIFFEST / case.contact.youngs_modulus
-    possible = [times for times in _TIMES if times <= hardest * (1.0 + 1e-9)]
-    further = len(possible) < len(_TIMES) and hardest >= _LEAST_INCREASE * possible[-1]
-    return [*possible, hardest] if further else possible
+    possible = [factor for factor in _MODULUS_FACTORS if factor <= hardest * (1.0 + 1e-9)]
+    if len(possible) < len(_MODULUS_FACTORS) and hardest >= _LEAST_INCREASE * possible[-1]:
+        possible.append(hardest)
+    return possible
 
 
-def _sweep(case: Case, name: str, possible: Sequence[float]) -> SweepDefinition:
-    """The case at half its time step, and with harder beads at steps as much smaller as the Rayleigh limit."""
-    step, modulus = 1e6 * case.run.time_step, 1e-6 * case.contact.youngs_modulus
-    factors = [(0.5, 1.0), *((times**-0.5, times) for times in possible[1:])]
-    points = {
-        "run.time_step": [f"{shorter * step!r} us" for shorter, _ in factors],
-        "contact.youngs_modulus": [
-            f"{min(harder * modulus, 1e-6 * STIFFEST)!r} MPa" for _, harder in factors
-        ],
+def _convergence_sweep(case: Case, name: str, factors: Sequence[float]) -> SweepDefinition:
+    """A sweep of the case: at half its time step, and with harder beads.
+
+    The harder beads have shorter time steps, as the Rayleigh limit demands.
+
+    Parameters
+    ----------
+    case
+        The case.
+    name
+        Name of the sweep.
+    factors
+        Young's moduli, divided by the modulus of the case. The first one, 1, is the case itself,
+        which has no point.
+    """
+    step = 1e6 * case.run.time_step
+    modulus = 1e-6 * case.contact.youngs_modulus
+    largest = 1e-6 * STIFFEST
+    time_steps = [f"{0.5 * step!r} us"]
+    moduli = [f"{min(modulus, largest)!r} MPa"]
+    for factor in factors[1:]:
+        shorter = factor**-0.5
+        time_steps.append(f"{shorter * step!r} us")
+        moduli.append(f"{min(factor * modulus, largest)!r} MPa")
+    file = {
+        "title": f"{case.title or case.name}: smaller time steps and harder beads",
+        "case": case.name,
+        "zip": [{"run.time_step": time_steps, "contact.youngs_modulus": moduli}],
     }
-    title = f"{case.title or case.name}: smaller time steps and harder beads"
-    file = {"title": title, "case": case.name, "zip": [points]}
     return expand(file, source=case.name, name=name, base=(case.name, case.document))
 
 
+def _headline_velocities(case: Case, table: pd.DataFrame) -> list[str]:
+    """The numbers that must converge: the main one, and those of both directions on a slope."""
+    names = [main_columns(table)[0]]
+    if case.goes_uphill or sides_differ(table):
+        names += SIDES
+    return names
+
+
+def _largest_change(
+    before: Mapping[Any, Any], after: Mapping[Any, Any], names: Iterable[str]
+) -> float:
+    """The largest relative change of velocities; those that are not finite do not count."""
+    changes = []
+    for name in names:
+        change = abs(after[name] - before[name]) / max(abs(after[name]), STEADY_SPEED)
+        if isfinite(change):
+            changes.append(float(change))
+    return max(changes)
+
+
 def _errors(
-    row: Mapping[str, Any], finer: pd.Series, hardest: Mapping[Any, Any]
+    numbers: Mapping[str, Any], finer: pd.Series, hardest: Mapping[Any, Any]
 ) -> dict[str, dict[str, float]]:
-    """Numerical errors of a row, by one with half its step and one with the hardest beads."""
+    """Numerical errors of the numbers of a run, by the same with half its time step or hard beads.
+
+    Parameters
+    ----------
+    numbers
+        The numbers of the run.
+    finer
+        Those of the run at half its time step.
+    hardest
+        Those of the run with the hardest beads.
+    """
     errors = {}
-    for name in row:
-        if name.startswith(_FAMILIES) and isfinite(row[name]):
-            half, stiffer = (float(run[name]) - row[name] for run in (finer, hardest))
-            errors[name] = {"half_step": half, "stiffer": stiffer, "total": hypot(half, stiffer)}
+    for name, number in numbers.items():
+        if not (name.startswith(_FAMILIES) and isfinite(number)):
+            continue
+        half_step = float(finer[name]) - number
+        stiffer = float(hardest[name]) - number
+        errors[name] = {
+            "half_step": half_step,
+            "stiffer": stiffer,
+            "total": hypot(half_step, stiffer),
+        }
     return errors

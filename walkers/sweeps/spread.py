@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, check_limits, input_error, key_error
 from walkers.files import write_json
-from walkers.inputs.axes import Range, ranges_of, unit_cube, value_in_unit
+from walkers.inputs.axes import ranges_of, unit_cube, written
 from walkers.inputs.messages import attributed_to
 from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import SweepDefinition, expand
@@ -46,31 +46,57 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 POINTS = 32
-"""Enough points for 5 and 95 %, and for the strongest rank correlations; a power of two, for Sobol's sequence."""
+"""Default number of draws: enough for 5 and 95 %, and for the strongest rank correlations.
+
+It is a power of two, as Sobol's sequence needs.
+"""
 _SEEDS = range(1, 65)
-"""Seeds of the scrambling; the one with the least correlated columns is used. With few points in many dimensions,
-correlations of columns reach 0.7, and the influences of the values could not be separated."""
-_WORDS = {
+"""Seeds of the scrambling, of which the one with the least correlated columns is used.
+
+With few points in many dimensions, correlations of columns reach 0.7, and the influences of the
+values could not be separated.
+"""
+_ROUNDING = 1e-9
+"""Relative distance by which the value of a case may be outside of its range."""
+_OUTCOMES = {
     "forward": "walk along the heading",
     "backward": "walk against the heading",
     "at_rest": f"rest (below {1e3 * REST:g} mm/s)",
     "separated": "come apart",
 }
-_ON_A_SLOPE = {"forward": "go up the slope", "backward": "go down"}
+"""What walkers do, by the keys of `Spread.counts`."""
+_OUTCOMES_ON_A_SLOPE = {**_OUTCOMES, "forward": "go up the slope", "backward": "go down"}
+_INDENT = " " * 13
+"""Start of the lines below a heading."""
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Results of a spread, in the directory of its sweep.
+    """Results of a spread.
 
-    ``varied`` are the values that were drawn from their ranges, ``held`` those of the liquid and unmeasured ones that
-    have no range (`walkers.postprocess.measure.uncertainty.held_of`).
-    ``bands`` has percentiles of the main results by the columns of the sweep's table (``low``, ``median`` and ``high``
-    for 5, 50 and 95 %), their ``smallest`` and ``largest`` values (SI units), and numbers of ``points``, without
-    walkers that came apart; ``depends`` has their rank correlations (Spearman) with the drawn values, the strongest
-    first, if larger than two standard errors.
-    ``counts`` are numbers of points whose walkers go ``forward`` (along the heading), …; empty for piles.
-    ``doubts`` are the warnings of each point that has any.
+    Attributes
+    ----------
+    directory
+        Directory of the sweep.
+    varied
+        Values that were drawn from their ranges.
+    held
+        Values of the liquid, and unmeasured ones, that have no range
+        (`walkers.postprocess.measure.uncertainty.held_of`).
+    bands
+        For each main result, by its column in the sweep's table, without walkers that came apart:
+        percentiles (``low``, ``median`` and ``high`` for 5, 50 and 95 %), the ``smallest`` and the
+        ``largest`` value, in SI units, and the number of ``points``.
+    depends
+        Rank correlations (Spearman) of the main results with the drawn values, the strongest first,
+        if larger than two standard errors.
+    counts
+        Numbers of points whose walkers go ``forward`` or ``backward`` along the heading, are
+        ``at_rest``, or have ``separated``; empty for piles.
+    failures
+        The failed points.
+    doubts
+        The warnings of each point that has any.
     """
 
     directory: Path
@@ -84,63 +110,104 @@ class Spread:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON types, SI units."""
-        contents = asdict(self) | {"directory": str(self.directory), "failed": len(self.failures)}
+        contents = asdict(self)
+        contents["directory"] = str(self.directory)
+        contents["failed"] = len(self.failures)
         del contents["failures"]
         return contents
 
 
-def _range_of(value: Origin) -> dict[str, list[Any]]:
-    """The range of a value for the sampler of a sweep; half of the draws are at or below the value of the case."""
-    name, (low, high) = (
-        "loguniform" if value.logarithmic else "uniform",
-        value.range or (None, None),
-    )
-    ends: Range = ranges_of({value.key: {name: [low, high]}})[value.key]
-    kind = quantity_kind(value.key)
-    try:
-        unit = parse_quantity(f"1 {ends.unit}", kind) if kind and ends.unit else 1.0
-        usual = (
-            parse_quantity(value.text, kind) if kind and ends.unit else float(value.text)
-        ) / unit
-    except ValueError:  # a value that the program computes, such as a time step
-        return {name: [low, high]}
-    if not ends.low * (1.0 - 1e-9) <= usual <= ends.high * (1.0 + 1e-9):
-        message = f"expected a range that holds the case's own value, {value.text}"
-        raise key_error(f"uncertain.{value.key}", message, [low, high])
-    return {name: [low, value_in_unit(min(max(usual, ends.low), ends.high), ends.unit), high]}
-
-
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> SweepDefinition:
-    """A sweep over the uncertain values of a case by Sobol's sequence, scrambled for the least correlated columns.
+    """A sweep over the uncertain values of a case by Sobol's sequence.
 
-    Half of the draws are at or below the value of the case. `InputError` if no value is uncertain, a range does not
-    contain the value of the case, or there are not 2 to 4096 points.
+    The value of the case is the median of the draws. The sequence is scrambled for the least
+    correlated columns.
+
+    Parameters
+    ----------
+    case
+        The case.
+    points
+        Number of draws, 2 to 4096.
+    engine
+        The engine that names the run of the case; None: the installed one.
+
+    Raises
+    ------
+    InputError
+        If no value is uncertain, a range does not contain the value of the case, or the number of
+        points is out of its limits.
     """
-    import numpy as np
-
     check_limits("points", points, 2, 4096)
     varied = [value for value in case.origins if value.range is not None]
     if not varied:
-        message = "no value is uncertain: give ranges in [uncertain], such as contact.restitution = [0.2, 0.8]"
-        raise input_error(case.name, message)
+        raise input_error(
+            case.name,
+            "no value is uncertain: give ranges in [uncertain], such as "
+            "contact.restitution = [0.2, 0.8]",
+        )
     with attributed_to(case.name, case.document):
         ranges = {value.key: _range_of(value) for value in varied}
-
-    def likeness(seed: int) -> float:
-        cube = unit_cube(len(varied), points, seed)
-        return float(np.abs(np.corrcoef(cube.T) - np.eye(len(varied))).max())
-
-    seed = min(_SEEDS, key=likeness) if len(varied) > 1 else _SEEDS[0]
+    sample = {
+        "method": "sobol",
+        "points": points,
+        "seed": _least_correlated_seed(len(varied), points),
+        "ranges": ranges,
+    }
     file = {
         "title": f"{case.title or case.name}: uncertain values drawn from their ranges",
         "case": case.name,
-        "sample": [{"method": "sobol", "points": points, "seed": seed, "ranges": ranges}],
+        "sample": [sample],
     }
     name = spread_of(run_place(case, find_engine(engine), Path())).name
     return expand(file, source=case.name, name=name, base=(case.name, case.document))
 
 
-def run_spread(
+def _range_of(value: Origin) -> dict[str, list[Any]]:
+    """The range of an uncertain value for the sampler of a sweep, with the value as the median.
+
+    Raises
+    ------
+    InputError
+        If the range does not contain the value.
+    """
+    assert value.range is not None
+    low, high = value.range
+    distribution = "loguniform" if value.logarithmic else "uniform"
+    ends = ranges_of({value.key: {distribution: [low, high]}})[value.key]
+    try:
+        usual = _number_in_unit(value, ends.unit)
+    except ValueError:  # a value that the program computes, such as a time step
+        return {distribution: [low, high]}
+    if not ends.low * (1.0 - _ROUNDING) <= usual <= ends.high * (1.0 + _ROUNDING):
+        message = f"expected a range that holds the case's own value, {value.text}"
+        raise key_error(f"uncertain.{value.key}", message, [low, high])
+    median = min(max(usual, ends.low), ends.high)
+    return {distribution: [low, value_in_unit(median, ends.unit), high]}
+
+
+def _number_in_unit(value: Origin, unit: str | None) -> float:
+    """The number of a value in a unit; `ValueError` if its text is not a number."""
+    kind = quantity_kind(value.key)
+    if kind and unit:
+        return parse_quantity(value.text, kind) / parse_quantity(f"1 {unit}", kind)
+    return float(value.text)
+
+
+def _least_correlated_seed(values: int, points: int) -> int:
+    """The seed for which the draws of the values are least correlated with each other."""
+    import numpy as np
+
+    def largest_correlation(seed: int) -> float:
+        cube = unit_cube(values, points, seed)
+        return float(np.abs(np.corrcoef(cube.T) - np.eye(values)).max())
+
+    if values == 1:
+        return _SEEDS[0]
+    return min(_SEEDS, key=largest_correlation)
+
+
+def run_spread(  # noqa: PLR0913
     case: Case,
     out: Path,
     options: SweepOptions,
@@ -149,108 +216,182 @@ def run_spread(
     engine: str | None = None,
     on_progress: Tell | None = None,
 ) -> Spread:
-    """Run a case with all unmeasured values drawn from their ranges, and write the bands beside the sweep's record.
+    """Run a case with all unmeasured values drawn from their ranges.
 
-    The case must be as read from a file. Runs that are made keep no dumps, which only pictures need. Other arguments:
-    see `walkers.sweeps.scheduler.run_sweep`. From then on, texts and reports of the case's run contain the bands.
+    The bands of the results are written beside the sweep's record. From then on, texts and reports
+    of the case's run contain them.
+
+    Parameters
+    ----------
+    case
+        The case as read from a file.
+    out
+        Folder of the run directories.
+    options
+        How the runs are made. They keep no dumps, which only pictures need.
+    points
+        Number of draws, see `spread_sweep`.
+    engine, on_progress
+        As of `walkers.sweeps.scheduler.run_sweep`.
 
     Notes
     -----
-    Values are drawn independently. Calibrated values are correlated (docs/explanation/calibration.md): for them, the
-    band is wider than that of the posterior.
+    Values are drawn independently. Calibrated values are correlated
+    (docs/explanation/calibration.md): for them, the band is wider than that of the posterior.
     """
     options = replace(options, dumps=False)
     draws = spread_sweep(case, points, engine)
     record, failures = run_sweep(draws, out, options, engine=engine, on_progress=on_progress)
     table = table_of(record)
     doubts = [result.warnings for result in table.results.values() if result.warnings]
-    spread = replace(spread_in(table.frame, case, record.directory, failures), doubts=doubts)
-    write_json(
-        record.directory / SPREAD_NAME, {**spread.as_dict(), "directory": record.directory.name}
-    )
+    spread = spread_in(table.frame, case, record.directory, failures)
+    spread = replace(spread, doubts=doubts)
+    contents = {**spread.as_dict(), "directory": record.directory.name}
+    write_json(record.directory / SPREAD_NAME, contents)
     return spread
 
 
 def spread_in(
     table: pd.DataFrame, case: Case, directory: Path, failures: Sequence[Failure] = ()
 ) -> Spread:
-    """The spread of a case by the table of its sweep in a directory."""
-    table = table[table["status"] == "finished"]
-    whole, counts = walking_points(table), {}
+    """The spread of a case by the table of its sweep.
+
+    Parameters
+    ----------
+    table
+        The table of the sweep, finished or not.
+    case
+        The case.
+    directory
+        Directory of the sweep.
+    failures
+        The failed points.
+    """
+    finished = table[table["status"] == "finished"]
+    whole = walking_points(finished)
     if "velocity" in table:
-        speeds = whole[main_columns(whole)[0]]
-        counts = {"forward": int((speeds > REST).sum()), "backward": int((speeds < -REST).sum())}
-        counts |= {
-            "at_rest": int((speeds.abs() <= REST).sum()),
-            "separated": len(table) - len(whole),
-        }
-    shown = (
-        [main_columns(whole)[0]]
-        if "velocity" in table
-        else [name for name in MAIN if name in table]
-    )
-    varied, bands = tuple(value for value in case.origins if value.range is not None), {}
-    for name in (name for name in shown if whole[name].notna().any()):
-        ends = whole[name].astype(float).quantile([0.05, 0.5, 0.95, 0.0, 1.0])
-        bands[name] = dict(
-            zip(("low", "median", "high", "smallest", "largest"), ends.tolist(), strict=True)
-        )
-        bands[name]["points"] = int(whole[name].count())
+        names = [main_columns(whole)[0]]
+        counts = _counts_of_outcomes(finished, whole, names[0])
+    else:
+        names = [name for name in MAIN if name in table]
+        counts = {}
+    varied = tuple(value for value in case.origins if value.range is not None)
+    keys = [value.key for value in varied]
+    bands = {}
+    depends = {}
+    for name in names:
+        if whole[name].notna().any():
+            bands[name] = _band_of(whole[name])
+        depends[name] = rank_correlations(whole, name, keys) or {}
     return Spread(
         directory=directory,
         varied=varied,
         held=held_of(case.origins),
         bands=bands,
-        depends={
-            name: rank_correlations(whole, name, [value.key for value in varied]) or {}
-            for name in shown
-        },
+        depends=depends,
         counts=counts,
         failures=tuple(failures),
     )
 
 
+def _counts_of_outcomes(
+    finished: pd.DataFrame, whole: pd.DataFrame, velocity: str
+) -> dict[str, int]:
+    """Numbers of draws by what their walkers do.
+
+    Parameters
+    ----------
+    finished
+        Rows of all finished draws.
+    whole
+        Those of draws whose walkers did not come apart.
+    velocity
+        The column of the velocity.
+    """
+    speeds = whole[velocity]
+    return {
+        "forward": int((speeds > REST).sum()),
+        "backward": int((speeds < -REST).sum()),
+        "at_rest": int((speeds.abs() <= REST).sum()),
+        "separated": len(finished) - len(whole),
+    }
+
+
+def _band_of(numbers: pd.Series) -> dict[str, float]:
+    """Percentiles and ends of the numbers of a result (`Spread.bands`)."""
+    ends = numbers.astype(float).quantile([0.05, 0.5, 0.95, 0.0, 1.0])
+    names = ("low", "median", "high", "smallest", "largest")
+    band = dict(zip(names, ends.tolist(), strict=True))
+    band["points"] = int(numbers.count())
+    return band
+
+
 def figures_of_spread(run: Path) -> dict[str, Figure]:
-    """The figure of the spread of a run, for its report; none if it has no spread, or no draw is finished."""
+    """The figure of the spread of a run, for its report.
+
+    The mapping is empty if the run has no spread, or no draw is finished.
+    """
     directory = spread_of(run.resolve())
-    if (directory / SPREAD_NAME).is_file():
-        with suppress(InputError), warnings.catch_warnings():
-            warnings.simplefilter("ignore", LeftOutWarning)
-            return {"spread": figure_of(table_of(read_sweep_record(directory)))}
+    if not (directory / SPREAD_NAME).is_file():
+        return {}
+    with suppress(InputError), warnings.catch_warnings():
+        warnings.simplefilter("ignore", LeftOutWarning)
+        return {"spread": figure_of(table_of(read_sweep_record(directory)))}
     return {}
 
 
 def spread_text(spread: Spread) -> str:
     """A spread in a few lines: mm, mm/s."""
     points = max((band["points"] for band in spread.bands.values()), default=0)
-    half = "half of them at or below the value of the case"
-    lines = [f"  spread     {points} draws; values drawn independently from their ranges, {half}"]
-    lines += [
-        f"{'':13}{value.key} {value.text} ({' to '.join(map(str, value.range or ()))})"
-        for value in spread.varied
+    lines = [
+        f"  spread     {points} draws; values drawn independently from their ranges, "
+        "half of them at or below the value of the case"
     ]
+    for value in spread.varied:
+        ends = " to ".join(map(str, value.range or ()))
+        lines.append(f"{_INDENT}{value.key} {value.text} ({ends})")
     lines += in_lines(f"    fixed    {held_text(spread.held)}")
     for name, band in spread.bands.items():
-        unit, factor = unit_shown(declared(name).unit)
-        texts = {
-            end: rounded(float(f"{number * factor:.3g}"), unit) for end, number in band.items()
-        }
-        ends = "{low} to {high} {unit} (5 to 95 %), median {median}; smallest {smallest}, largest {largest}"
-        lines.append(f"    {declared(name).label:8} {ends.format(unit=unit, **texts)}")
-        text = "no clear dependence on any of them"
-        if few_draws(int(band["points"]), len(spread.varied)):
-            text = "too few draws for rank correlations; the band is approximate"
-        elif ranks := ", ".join(f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items()):
-            text = f"strongest dependence: {ranks} (rank correlation)"
-        lines.append(f"{'':13}{text}")
-    words = _WORDS | (
-        _ON_A_SLOPE if {"right_facing", "axial_velocity"} & spread.bands.keys() else {}
-    )
-    draws = [f"{count} {words[name]}" for name, count in spread.counts.items() if count]
-    draws += [f"{len(spread.failures)} failed, not in the band"] if spread.failures else []
-    lines += [f"    draws    {', '.join(draws)}"] if draws else []
+        lines.append(f"    {declared(name).label:8} {_band_text(name, band)}")
+        lines.append(f"{_INDENT}{_dependence_text(spread, name)}")
+    outcomes = _outcomes_text(spread)
+    if outcomes:
+        lines.append(f"    draws    {outcomes}")
     if spread.doubts:
-        lines += in_lines(
-            f"    warning  {counted(len(spread.doubts), 'draw')} with warnings, first: {spread.doubts[0][0]}"
-        )
-    return "\n".join([*lines, f"    table    {spread.directory}"])
+        draws = counted(len(spread.doubts), "draw")
+        lines += in_lines(f"    warning  {draws} with warnings, first: {spread.doubts[0][0]}")
+    lines.append(f"    table    {spread.directory}")
+    return "\n".join(lines)
+
+
+def _band_text(name: str, band: Mapping[str, float]) -> str:
+    """The band of a result in its displayed unit."""
+    unit, factor = unit_shown(declared(name).unit)
+    texts = {}
+    for end, number in band.items():
+        texts[end] = rounded(float(f"{number * factor:.3g}"), unit)
+    return (
+        f"{texts['low']} to {texts['high']} {unit} (5 to 95 %), median {texts['median']}; "
+        f"smallest {texts['smallest']}, largest {texts['largest']}"
+    )
+
+
+def _dependence_text(spread: Spread, name: str) -> str:
+    """On which drawn values a result depends most."""
+    if few_draws(int(spread.bands[name]["points"]), len(spread.varied)):
+        return "too few draws for rank correlations; the band is approximate"
+    ranks = [f"{key} {rank:+.2f}" for key, rank in spread.depends[name].items()]
+    if not ranks:
+        return "no clear dependence on any of them"
+    return f"strongest dependence: {', '.join(ranks)} (rank correlation)"
+
+
+def _outcomes_text(spread: Spread) -> str:
+    """What the walkers of the draws do; empty if nothing can be said."""
+    words = _OUTCOMES
+    if "right_facing" in spread.bands or "axial_velocity" in spread.bands:
+        words = _OUTCOMES_ON_A_SLOPE
+    texts = [f"{count} {words[name]}" for name, count in spread.counts.items() if count]
+    if spread.failures:
+        texts.append(f"{len(spread.failures)} failed, not in the band")
+    return ", ".join(texts)
