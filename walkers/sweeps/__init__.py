@@ -1,4 +1,5 @@
-"""Sweeps: run many cases in shared decks, on this machine or a cluster; list, compare and draw their results.
+"""Sweeps run many cases in shared decks, on this machine or on a cluster.
 
-Uses the packages for cases, decks, run directories and results.
+This package also lists, compares and draws their results. It uses the packages for cases, decks,
+run directories and results.
 """

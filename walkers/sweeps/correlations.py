@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,23 +16,40 @@ if TYPE_CHECKING:
 
 
 def rank_correlations(
-    done: pd.DataFrame, column: str, keys: Sequence[str]
+    finished: pd.DataFrame, column: str, keys: Sequence[str]
 ) -> dict[str, float] | None:
-    """Rank correlations of a column with drawn keys, the strongest first, if larger than two standard errors.
+    """Rank correlations of a result with drawn keys, if larger than two standard errors.
 
-    Points without a number and walkers that came apart do not count. None if the draws are too few (`few_draws`).
+    Parameters
+    ----------
+    finished
+        Rows of finished points. Points without a number in the column, or whose walkers came apart,
+        do not count.
+    column
+        The column of the result.
+    keys
+        The drawn keys.
+
+    Returns
+    -------
+    dict or None
+        Spearman's correlations by key, the strongest first; None if the draws are too few
+        (`walkers.postprocess.measure.uncertainty.few_draws`).
     """
-    points = walking_points(done).dropna(subset=column)
+    points = walking_points(finished).dropna(subset=column)
     if few_draws(len(points), len(keys)):
         return None
-    ranks = {key: _rank_correlation(points[key], points[column]) for key in keys}
-    certain = {key: rank for key, rank in ranks.items() if abs(rank) > 2.0 / sqrt(len(points) - 1)}
-    return dict(sorted(certain.items(), key=lambda item: -abs(item[1])))
+    two_standard_errors = 2.0 / sqrt(len(points) - 1)
+    ranks = {}
+    for key in keys:
+        rank = _rank_correlation(points[key], points[column])
+        if abs(rank) > two_standard_errors:
+            ranks[key] = rank
+    return dict(sorted(ranks.items(), key=lambda item: -abs(item[1])))
 
 
-def _rank_correlation(first: Any, second: Any) -> float:
-    """Spearman's correlation of two columns, the correlation of their ranks; 0 if one is constant."""
-    import pandas as pd
-
-    rank = pd.Series(first, dtype=float).rank().corr(pd.Series(second, dtype=float).rank())
-    return 0.0 if np.isnan(rank) else float(rank)
+def _rank_correlation(first: pd.Series, second: pd.Series) -> float:
+    """Spearman's correlation of two columns, that of their ranks; 0 if one column is constant."""
+    ranks = first.astype(float).rank()
+    correlation = ranks.corr(second.astype(float).rank())
+    return 0.0 if np.isnan(correlation) else float(correlation)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from walkers.errors import input_error
 from walkers.postprocess.measure.quantities import declared, is_declared, unit_shown
@@ -56,8 +57,10 @@ class Factor:
     @property
     def levels(self) -> list[Any]:
         """The different values: numbers in ascending order, texts in the order of the sweep."""
-        different = dict.fromkeys(self.values)
-        return sorted(different) if self.is_number else list(different)
+        different = list(dict.fromkeys(self.values))
+        if self.is_number:
+            different.sort()
+        return different
 
     @property
     def label(self) -> str:
@@ -65,27 +68,44 @@ class Factor:
         label = with_unit(self.name, self.unit)
         if not self.further_keys:
             return label
-        words = ", ".join(readable_key(key) for key in self.further_keys)
         if len(self.further_keys) > 2:
             words = f"{len(self.further_keys)} further keys"
+        else:
+            words = ", ".join(map(readable_key, self.further_keys))
         return f"{label}\n(and with it {words})"
 
     def is_among(self, factors: Sequence[Factor]) -> bool:
-        """Whether one of several factors has the keys of this one, or distinguishes the same points."""
+        """Whether one of several factors has the same keys, or tells the same points apart."""
         for factor in factors:
-            pairs = len(set(zip(self.values, factor.values, strict=True)))
-            if self.keys == factor.keys or pairs == len(self.levels) == len(factor.levels):
+            pairs = set(zip(self.values, factor.values, strict=True))
+            if self.keys == factor.keys or len(pairs) == len(self.levels) == len(factor.levels):
                 return True
         return False
 
-    def exact(self, level: float) -> float:
-        """A number, or zero if it is a rounding error."""
-        return 0.0 if abs(level) < ROUNDING * max(map(abs, self.levels)) else level
+    def without_rounding(self, level: float) -> float:
+        """A number; zero if it is a rounding error, compared with the largest number."""
+        largest = max(abs(number) for number in self.levels)
+        return 0.0 if abs(level) < ROUNDING * largest else level
 
-    def text(self, level: Any, *, by_name: bool = False) -> str:
-        """A level as text with its unit, for numbers optionally with the factor's name."""
-        text = f"{self.exact(level):.6g} {self.unit}".strip() if self.is_number else str(level)
-        return f"{self.name} = {text}" if by_name and self.is_number else text
+    def text(self, level: Any) -> str:
+        """A level as text, with its unit."""
+        if not self.is_number:
+            return str(level)
+        return f"{self.without_rounding(level):.6g} {self.unit}".strip()
+
+    def has_level(self, level: Any) -> npt.NDArray[np.bool_]:
+        """Which points have a level, shape (N,)."""
+        return np.array([value == level for value in self.values])
+
+    @property
+    def texts(self) -> list[str]:
+        """The values as texts."""
+        return [self.text(value) for value in self.values]
+
+    def text_with_name(self, level: Any) -> str:
+        """A level as text with its unit; a number also with the name of the factor."""
+        text = self.text(level)
+        return f"{self.name} = {text}" if self.is_number else text
 
 
 def factors_of(table: pd.DataFrame) -> list[Factor]:
@@ -94,15 +114,19 @@ def factors_of(table: pd.DataFrame) -> list[Factor]:
     The keys of an axis are one factor if their numbers rise or fall together, or if some have texts
     or lists. Otherwise, as in a sample, each key is a factor.
     """
-    factors = []
+    factors: list[Factor] = []
     for keys in table.attrs["axes"]:
         factors += _factors_of_axis(table, keys)
     return factors
 
 
 def _factors_of_axis(table: pd.DataFrame, keys: Sequence[str]) -> list[Factor]:
-    factors = [_factor_of_key(table, key) for key in keys]
-    factors = [factor for factor in factors if len(factor.levels) > 1]
+    """The factors of keys that vary together."""
+    factors = []
+    for key in keys:
+        factor = _factor_of_key(table, key)
+        if len(factor.levels) > 1:
+            factors.append(factor)
     if len(factors) < 2:
         return factors
     if not all(factor.is_number for factor in factors):
@@ -113,15 +137,15 @@ def _factors_of_axis(table: pd.DataFrame, keys: Sequence[str]) -> list[Factor]:
 
 
 def _factor_of_key(table: pd.DataFrame, key: str) -> Factor:
+    """The factor of a key: of numbers if all of its values are numbers, otherwise of texts."""
     values, unit = key_values(table, key)
-    is_number = all(type(value) in (int, float) for value in values)
-    if not is_number:
+    if not all(type(value) in (int, float) for value in values):
         texts = [value_text(value, unit) for value in values]
-        return Factor((key,), readable_key(key), texts, is_number=False)
+        return Factor(keys=(key,), name=readable_key(key), values=texts, is_number=False)
     return Factor(
         keys=(key,),
         name=readable_key(key),
-        values=[float(value) for value in values],
+        values=list(map(float, values)),
         is_number=True,
         is_log=table.attrs.get("sampled", {}).get(key, False),
         unit=unit or "",
@@ -142,44 +166,76 @@ def _named_points(factors: Sequence[Factor]) -> Factor:
 
     The names are the values of the first key that tells all points apart, or those of all keys.
     """
-    points = list(zip(*(factor.values for factor in factors), strict=True))
+    points = set(zip(*(factor.values for factor in factors), strict=True))
     for factor in factors:
-        if len(factor.levels) == len(set(points)):
-            texts = [factor.text(value) for value in factor.values]
-            named = Factor(factor.keys, factor.name, texts, is_number=False)
+        if len(factor.levels) == len(points):
+            named = Factor(keys=factor.keys, name=factor.name, values=factor.texts, is_number=False)
             return _with_further_keys(named, factors)
-    texts = []
-    for point in points:
-        values = [factor.text(value) for factor, value in zip(factors, point, strict=True)]
-        texts.append(", ".join(values))
-    keys = tuple(key for factor in factors for key in factor.keys)
-    name = ", ".join(factor.name for factor in factors)
-    return Factor(keys, name, texts, is_number=False)
+    texts_of_points = zip(*(factor.texts for factor in factors), strict=True)
+    return Factor(
+        keys=_keys_of(factors),
+        name=", ".join(factor.name for factor in factors),
+        values=[", ".join(texts) for texts in texts_of_points],
+        is_number=False,
+    )
 
 
 def _with_further_keys(first: Factor, factors: Sequence[Factor]) -> Factor:
     """The first of several factors that change together; its label names the others."""
-    further = tuple(key for factor in factors for key in factor.keys if key not in first.keys)
-    return replace(first, keys=(*first.keys, *further), further_keys=further)
+    further = tuple(key for key in _keys_of(factors) if key not in first.keys)
+    return replace(first, keys=first.keys + further, further_keys=further)
+
+
+def _keys_of(factors: Sequence[Factor]) -> tuple[str, ...]:
+    """The keys of several factors."""
+    keys: tuple[str, ...] = ()
+    for factor in factors:
+        keys += factor.keys
+    return keys
 
 
 def readable_key(key: str) -> str:
-    """A dotted key or a column as words: ``friction bead wall``, ``liquid``; numbers of results by their labels."""
+    """A dotted key or a column as words: ``friction bead wall``, ``liquid``.
+
+    A column of results is called by the label of its numbers.
+    """
     table, _, name = key.partition(".")
-    if is_declared(name or table):
-        return declared(name or table).label
-    words = table.partition("[")[0] if name in ("name", "material") else (name or table)
+    column = name or table
+    if is_declared(column):
+        return declared(column).label
+    words = column
+    if name in ("name", "material"):  # "liquid" says more than "name"
+        words, _, _ = table.partition("[")
     return words.replace(".", " ").replace("_", " ")
 
 
 def number_factor(rows: pd.DataFrame, name: str, option: str) -> Factor:
-    """A column of numbers in its displayed unit."""
+    """The factor of a column of numbers, in its displayed unit.
+
+    Parameters
+    ----------
+    rows
+        Rows of a sweep's table.
+    name
+        The column.
+    option
+        The option or argument that names the column, for the message of the error.
+
+    Raises
+    ------
+    InputError
+        If there are rows, and the column has no number.
+    """
     import pandas as pd
 
-    unit, factor = unit_shown(rows.attrs["units"].get(name) or "")
+    unit, units_per_si = unit_shown(rows.attrs["units"].get(name) or "")
     values = pd.to_numeric(rows[name], errors="coerce").to_numpy(dtype=float, na_value=np.nan)
     if len(rows) and np.isnan(values).all():
         raise input_error(option, f'"{name}" has no number that could be drawn')
     return Factor(
-        (name,), readable_key(name), (values * factor).tolist(), is_number=True, unit=unit
+        keys=(name,),
+        name=readable_key(name),
+        values=(values * units_per_si).tolist(),
+        is_number=True,
+        unit=unit,
     )

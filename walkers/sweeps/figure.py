@@ -32,12 +32,12 @@ from walkers.sweeps.left_out import warn_left_out
 from walkers.sweeps.predictions import Predict, Theory
 from walkers.sweeps.scales import scale_x, scale_y
 from walkers.sweeps.series import (
+    Colours,
     Series,
     category_offset,
     draw_legend,
     draw_series,
     draw_theory,
-    level_styles,
     points_of,
 )
 from walkers.sweeps.table import FACING_DOWN, SweepTable, default_column, find_name
@@ -48,28 +48,32 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _BARS = "bars: standard deviation of the copies"
+"""What the error bars are if uncertain parameters are varied."""
 SCATTER = f"{_BARS} (uncertain parameters not varied)"
-"""What the error bars of a sweep are."""
+"""What the error bars are if no uncertain parameter is varied."""
 _BAND = "band: uncertain values only"
 """What the bands of a sweep are, in the legend."""
 _NOT_IN_BAND = "the error of the model is not in it"
+"""What the title says of the bands."""
 _LETTERS_OF_LABEL = 26
 """Letters of a line of a y label."""
 _LETTERS_PER_INCH = 14.0
 """Letters of a line of the title, per inch of the figure."""
 _ONE_PANEL = 4.2
 """Height of a figure of one panel, inches."""
+_MOST_COLUMNS = 3
+"""Largest number of panels side by side."""
 
 
 def figure_of(
     table: SweepTable, options: FigureOptions = FigureOptions(), predict: Predict | None = None
 ) -> Figure:
-    """Figure of the table of a sweep, with the predictions of a theory if there is one.
+    """The figure of the table of a sweep, with the predictions of a theory if there is one.
 
     Bars are the scatter over copies where the table has it. Without y, on slopes where the walkers
     that face up and down differ, both are drawn. The axis of a key has the unit of the sweep file;
-    other columns are in mm, mm/s, g (9.8 m/s²) and degrees. What is left out is reported by
-    `walkers.sweeps.left_out.LeftOutWarning`.
+    other columns are in mm, mm/s, g (9.8 m/s²) and degrees. A
+    `walkers.sweeps.left_out.LeftOutWarning` says what is left out.
 
     Parameters
     ----------
@@ -89,32 +93,33 @@ def figure_of(
         raise input_error("log", f"{options.log!r}: {expected_of(options.log, get_args(Log))}")
     frame = table.frame
     column = column_of(frame, options.y)
-    done = table.finished
-    _tell_left_out(frame, done, column)
-    layout = figure_layout(frame, done, options)
+    finished = table.finished
+    _tell_left_out(frame, finished, column)
+    layout = figure_layout(frame, finished, options)
     if layout.hidden:
         warn_left_out(f"not distinguished: {'; '.join(factor.name for factor in layout.hidden)}")
     log = options.log or ""
-    if "x" in log and not all(factor.is_number for factor in layout.along):
-        raise input_error("log", f"{layout.along[0].label} has no numbers")
+    if "x" in log and not all(factor.is_number for factor in layout.x_factors):
+        raise input_error("log", f"{layout.x_factors[0].label} has no numbers")
     theory = Theory.at_points(table, column, log, predict) if predict else None
     down = None if options.y else FACING_DOWN.get(column)
-    return _draw(done, column, layout, theory, down=down, log=log)
+    content = _Content(finished=finished, column=column, down=down, layout=layout, theory=theory)
+    return _draw(content, log)
 
 
-def _tell_left_out(frame: pd.DataFrame, done: pd.DataFrame, column: str) -> None:
+def _tell_left_out(frame: pd.DataFrame, finished: pd.DataFrame, column: str) -> None:
     """Warn about points that are not drawn; `InputError` if none is finished."""
     counts = Counter(frame["status"][frame["status"] != "finished"])
     unfinished = status_text(counts)
-    if done.empty:
+    if finished.empty:
         raise input_error(
             str(frame.attrs["sweep"]), f"no point is finished ({unfinished or 'there is none'})"
         )
     if counts:
         warn_left_out(f"{counts.total()} of {len(frame)} points left out: {unfinished}")
-    empty = int(done[column].isna().sum())
+    empty = int(finished[column].isna().sum())
     if empty:
-        warn_left_out(f"{empty} of {len(done)} finished points have no {column}")
+        warn_left_out(f"{empty} of {len(finished)} finished points have no {column}")
 
 
 def column_of(table: pd.DataFrame, name: str | None) -> str:
@@ -123,8 +128,43 @@ def column_of(table: pd.DataFrame, name: str | None) -> str:
 
 
 @dataclass(frozen=True)
+class _Content:
+    """What a figure shows.
+
+    Attributes
+    ----------
+    finished
+        Rows of the finished points.
+    column
+        The column on the y axis.
+    down
+        The column of walkers that face down, if they are drawn beside those that face up.
+    layout
+        Which factors are on the x axis, in colours and in panels.
+    theory
+        The predictions of models, if they are drawn.
+    """
+
+    finished: pd.DataFrame
+    column: str
+    down: str | None
+    layout: FigureLayout
+    theory: Theory | None
+
+
+@dataclass(frozen=True)
 class _Panel:
-    """A panel: the factor on its x axis, which points it shows, and its title."""
+    """A panel.
+
+    Attributes
+    ----------
+    x
+        The factor on its x axis.
+    drawn
+        Which of the finished points it shows, shape (N,).
+    title
+        Its title.
+    """
 
     x: Factor
     drawn: npt.NDArray[np.bool_]
@@ -132,54 +172,53 @@ class _Panel:
 
 
 @styled
-def _draw(
-    done: pd.DataFrame,
-    column: str,
-    layout: FigureLayout,
-    theory: Theory | None,
-    *,
-    down: str | None,
-    log: str,
-) -> Figure:
-    """Draw a column of the finished points."""
-    label, points = points_of(done, column, down)
-    panels, remark = _panels_of(done, column, layout)
-    looks = level_styles(layout.hue, hollow=theory is not None)
-    figure, grid = _empty_grid(len(panels), share_x=len(layout.along) == 1)
+def _draw(content: _Content, log: str) -> Figure:
+    """Draw a figure, with logarithmic axes for the letters in ``log``."""
+    finished = content.finished
+    column = content.column
+    theory = content.theory
+    label, points = points_of(finished, column, content.down)
+    panels, remark = _panels_of(content)
+    colours = Colours.of_factor(content.layout.hue, hollow=theory is not None)
+    figure, grid = _empty_grid(len(panels), share_x=len(content.layout.x_factors) == 1)
     for axes, panel in zip(grid.flat, panels, strict=False):
-        _draw_panel(axes, panel, layout.hue, looks, points, theory)
+        _draw_panel(axes, panel, colours, points, theory)
         scale_x(axes, panel.x, log)
     _label_panels(grid, panels, label)
     models = theory.values if theory else {}
     scale_y(grid[0, 0], points, list(models.values()), log)
     band = ""
     if "low" in points:
-        band = f"{_BAND}, 5 to 95 % of {_draws(done, column)}"
-    draw_legend(figure, layout.hue, looks, list(models), down="down" in points, band=band)
-    _draw_title(figure, [done.attrs["title"], remark, *_remarks(done, points, band)])
+        band = f"{_BAND}, 5 to 95 % of {_draws(finished, column)}"
+    draw_legend(figure, colours, list(models), down="down" in points, band=band)
+    _draw_title(figure, [finished.attrs["title"], remark, *_remarks(finished, points, band)])
     return figure
 
 
-def _panels_of(done: pd.DataFrame, column: str, layout: FigureLayout) -> tuple[list[_Panel], str]:
-    """The panels of a layout, and a remark for the title, which may be empty."""
+def _panels_of(content: _Content) -> tuple[list[_Panel], str]:
+    """The panels of a figure, and a remark for the title, which may be empty."""
+    layout = content.layout
     if layout.panels is not None:
         panels = []
         for level in layout.panels.levels:
-            title = layout.panels.text(level, by_name=True)
-            panels.append(_Panel(layout.along[0], _has_level(layout.panels, level), title))
+            title = layout.panels.text_with_name(level)
+            panels.append(_Panel(layout.x_factors[0], layout.panels.has_level(level), title))
         return panels, ""
-    panels = [_Panel(x, _with_usual_others(x, layout.along)) for x in layout.along]
-    sampled = done.attrs.get("sampled", {})
+    panels = [_Panel(x, _with_usual_others(x, layout.x_factors)) for x in layout.x_factors]
+    sampled = content.finished.attrs.get("sampled", {})
     if len(panels) > 1 and all(panel.x.keys[0] in sampled for panel in panels):
-        return _ranked(panels, done, column)
+        return _ranked(panels, content.finished, content.column)
     return panels, ""
 
 
-def _ranked(panels: list[_Panel], done: pd.DataFrame, column: str) -> tuple[list[_Panel], str]:
-    """Panels of drawn keys, the strongest dependence first; a remark if the draws are too few to say."""
-    ranks = rank_correlations(done, column, list(done.attrs["sampled"]))
+def _ranked(panels: list[_Panel], finished: pd.DataFrame, column: str) -> tuple[list[_Panel], str]:
+    """Panels of the keys of a sample, the strongest dependence first, with rank correlations.
+
+    If the draws are too few for these, the panels keep their order, and a remark says so.
+    """
+    ranks = rank_correlations(finished, column, list(finished.attrs["sampled"]))
     if ranks is None:
-        return panels, f"{len(done)} draws: too few for rank correlations"
+        return panels, f"{len(finished)} draws: too few for rank correlations"
     titled = []
     for panel in panels:
         key = panel.x.keys[0]
@@ -189,30 +228,32 @@ def _ranked(panels: list[_Panel], done: pd.DataFrame, column: str) -> tuple[list
     return titled, ""
 
 
-def _with_usual_others(x: Factor, along: Sequence[Factor]) -> npt.NDArray[np.bool_]:
-    """Which points the panel of a factor shows, one of several on x axes.
+def _with_usual_others(x: Factor, x_factors: Sequence[Factor]) -> npt.NDArray[np.bool_]:
+    """Which points the panel of a factor shows, shape (N,).
 
     If factors vary one at a time, these are the points with the usual values of the other factors;
     otherwise all.
+
+    Parameters
+    ----------
+    x
+        The factor on the x axis of the panel.
+    x_factors
+        The factors on the x axes of all panels.
     """
-    changes = {}
-    for factor in along:
+    is_changed = {}
+    for factor in x_factors:
         usual, _ = Counter(factor.values).most_common(1)[0]
-        changes[factor.keys] = np.array([value != usual for value in factor.values])
-    number = np.sum(list(changes.values()), axis=0)
-    if (number > 1).any():
-        return np.full(len(number), fill_value=True)
-    return np.array(changes[x.keys] | (number == 0))
-
-
-def _has_level(factor: Factor, level: Any) -> npt.NDArray[np.bool_]:
-    """Which points have a level of a factor."""
-    return np.array([value == level for value in factor.values])
+        is_changed[factor.keys] = ~factor.has_level(usual)
+    changes = np.sum(list(is_changed.values()), axis=0)
+    if (changes > 1).any():
+        return np.full(len(changes), fill_value=True)
+    return np.array(is_changed[x.keys] | (changes == 0))
 
 
 def _empty_grid(number: int, *, share_x: bool) -> tuple[Figure, npt.NDArray[Any]]:
-    """A figure with axes for a number of panels, of which all share the y axis; further axes are off."""
-    columns = min(number, 3)
+    """A figure with axes for a number of panels, which share the y axis; further axes are off."""
+    columns = min(number, _MOST_COLUMNS)
     if number == 4:
         columns = 2
     rows = ceil(number / columns)
@@ -228,39 +269,35 @@ def _empty_grid(number: int, *, share_x: bool) -> tuple[Figure, npt.NDArray[Any]
 
 
 def _draw_panel(
-    axes: Axes,
-    panel: _Panel,
-    hue: Factor | None,
-    looks: dict[Any, dict[str, Any]],
-    points: pd.DataFrame,
-    theory: Theory | None,
+    axes: Axes, panel: _Panel, colours: Colours, points: pd.DataFrame, theory: Theory | None
 ) -> None:
-    """Draw the points of a panel, those of each colour with its predictions."""
-    for number, (level, look) in enumerate(looks.items()):
-        aside = 0.0
+    """Draw the points of a panel, those of each colour with the predictions for them."""
+    for number, (level, style) in enumerate(colours.styles.items()):
+        offset = 0.0
         if not panel.x.is_number:
-            aside = category_offset(number, len(looks))
-        drawn = panel.drawn
-        if hue is not None:
-            drawn = drawn & _has_level(hue, level)
-        series = Series.of_points(panel.x, drawn, aside)
-        draw_series(axes, series, points, look, joined=theory is None)
+            offset = category_offset(number, len(colours.styles))
+        series = Series.of_points(panel.x, colours.are_drawn(level, panel.drawn), offset)
+        draw_series(axes, series, points, style, joined=theory is None)
         if theory is not None:
-            draw_theory(axes, series, theory, look["color"])
+            draw_theory(axes, series, theory, style["color"])
     values = points.drop(columns="error")
     if np.nanmin(values) <= 0.0 <= np.nanmax(values):
         axes.axhline(0.0, color="0.4", lw=0.6, zorder=0)
 
 
 def _label_panels(grid: npt.NDArray[Any], panels: Sequence[_Panel], label: str) -> None:
-    """Titles and letters of panels; labels of y at the left, and of x below or, of samples, below each panel."""
+    """Write titles, letters and labels of panels.
+
+    The leftmost panels have the label of y, the lowest ones that of x; if the panels have different
+    factors on the x axis, as those of a sample, each has its own.
+    """
     columns = grid.shape[1]
     drawn = list(grid.flat)[: len(panels)]
-    is_sample = len({panel.x.keys for panel in panels}) > 1
+    have_own_x = len({panel.x.keys for panel in panels}) > 1
     for number, (axes, panel) in enumerate(zip(drawn, panels, strict=True)):
         axes.set_title(plain_text(panel.title))
         is_lowest = number + columns >= len(panels)
-        if is_sample or is_lowest:
+        if have_own_x or is_lowest:
             axes.set_xlabel(plain_text(panel.x.label))
             axes.tick_params(labelbottom=True)
         if number % columns == 0:
@@ -269,20 +306,26 @@ def _label_panels(grid: npt.NDArray[Any], panels: Sequence[_Panel], label: str) 
         letter_panels(drawn)
 
 
-def _draws(done: pd.DataFrame, column: str) -> str:
-    """Numbers of draws of the spreads at the points: ``32``, or ``30 to 32`` if some failed or came apart."""
-    numbers = done[f"{column}_draws"].dropna()
-    draws = " to ".join(f"{number:.0f}" for number in sorted({numbers.min(), numbers.max()}))
-    return draws_text(draws, approximate=bool(done[f"{column}_approximate"].eq(True).any()))
+def _draws(finished: pd.DataFrame, column: str) -> str:
+    """Numbers of draws of the spreads at the points: ``32``, or ``30 to 32`` if they differ.
+
+    They do if some draws failed, or their walkers came apart.
+    """
+    numbers = finished[f"{column}_draws"].dropna()
+    draws = f"{numbers.min():.0f}"
+    if numbers.max() > numbers.min():
+        draws += f" to {numbers.max():.0f}"
+    is_approximate = bool(finished[f"{column}_approximate"].eq(True).any())
+    return draws_text(draws, approximate=is_approximate)
 
 
-def _remarks(done: pd.DataFrame, points: pd.DataFrame, band: str) -> list[str]:
+def _remarks(finished: pd.DataFrame, points: pd.DataFrame, band: str) -> list[str]:
     """What the bands and the error bars of a figure are, for its title."""
     remarks = []
     if band:
         remarks.append(f"{band}; {_NOT_IN_BAND}")
     if points["error"].notna().any():
-        are_varied = bool(band) or not set(unmeasured()).isdisjoint(done.attrs["varied"])
+        are_varied = bool(band) or not set(unmeasured()).isdisjoint(finished.attrs["varied"])
         bars = _BARS if are_varied else SCATTER
         if not errors_seen(points["error"], points["value"]):
             bars += ", smaller than the symbols"

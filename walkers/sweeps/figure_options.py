@@ -1,4 +1,7 @@
-"""Choices for the figure of a sweep, for Python and for the program; nothing that takes long is imported."""
+"""Options of the figure of a sweep, for Python and for the program.
+
+Nothing that takes long is imported.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from typing import Literal
 from cyclopts import Parameter
 
 Log = Literal["x", "y", "xy"]
+"""Letters of logarithmic axes."""
 
 
 @Parameter(name="*")

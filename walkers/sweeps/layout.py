@@ -1,4 +1,4 @@
-"""Which properties of a sweep's points go on the x axis of its figure, into colours and into panels."""
+"""Which factors of a sweep go on the x axis of its figure, into colours and into panels."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 NO_FACTOR = "none"
-"""What an option says to leave out colours or panels."""
+"""Value of the options ``hue`` and ``panels`` that leaves out colours or panels."""
 
 
 @dataclass(frozen=True)
@@ -24,17 +24,17 @@ class FigureLayout:
 
     Attributes
     ----------
-    along
+    x_factors
         The factor on the x axis; of a sample, the factors on the x axes of one panel each.
     hue
         The factor that colours tell apart, if there is one.
     panels
         The factor that panels tell apart, if there is one.
     hidden
-        Factors in which points differ that look alike.
+        Factors that the figure does not show: points with different values look the same.
     """
 
-    along: Sequence[Factor]
+    x_factors: Sequence[Factor]
     hue: Factor | None = None
     panels: Factor | None = None
     hidden: Sequence[Factor] = ()
@@ -62,24 +62,22 @@ def figure_layout(
     ------
     InputError
         If there is no key or column of a name, or more keys vary than the figure shows and no
-        option says ``none``.
+        option is ``none``.
     """
     factors = _factors_of_rows(table, rows)
     x = _chosen("x", options.x, factors, rows)
     hue = _chosen("hue", options.hue, factors, rows)
     panels = _chosen("panels", options.panels, factors, rows)
     chosen = [factor for factor in (x, hue, panels) if factor is not None]
-    left = [factor for factor in factors if not factor.is_among(chosen)]
-    along = [x] if x else _default_x(left, rows)
-    if len(along) > 1 and panels:
+    left = _without(factors, chosen)
+    x_factors = [x] if x else _default_x(left, rows)
+    if len(x_factors) > 1 and panels:
         raise input_error("panels", "expected x too: the samples have a panel for each key")
-    left = [factor for factor in left if factor not in along and factor.keys[0] not in SEEDS]
+    left = [factor for factor in left if factor not in x_factors and not _is_seed(factor)]
     if options.hue is None:
-        hue = next((factor for factor in left if not factor.is_sample), None)
-    shown = [factor for factor in (hue, panels) if factor]
-    shown += [factor for factor in factors if factor.is_among(along) and not factor.is_sample]
-    hidden = [factor for factor in left if not _follows_from(shown, factor)]
-    layout = FigureLayout(along, hue, panels, hidden)
+        hue = _first_not_sampled(left)
+    hidden = _hidden_factors(left, factors, FigureLayout(x_factors, hue, panels))
+    layout = FigureLayout(x_factors, hue, panels, hidden)
     if NO_FACTOR not in (options.hue, options.panels):
         _check_all_shown(layout)
     return layout
@@ -88,14 +86,17 @@ def figure_layout(
 def _factors_of_rows(table: pd.DataFrame, rows: pd.DataFrame) -> list[Factor]:
     """The factors of a table with the values of some of its rows.
 
-    Those that have one value in these rows are left out, unless all have.
+    Factors that have one value in these rows are left out, unless all have.
     """
     places = table.index.get_indexer(rows.index).tolist()
     factors = []
-    for factor in factors_of(table):
-        values = [factor.values[place] for place in places]
-        factors.append(replace(factor, values=values))
-    varying = [factor for factor in factors if len(factor.levels) > 1]
+    varying = []
+    for of_table in factors_of(table):
+        values = [of_table.values[place] for place in places]
+        factor = replace(of_table, values=values)
+        factors.append(factor)
+        if len(factor.levels) > 1:
+            varying.append(factor)
     return varying or factors
 
 
@@ -105,63 +106,107 @@ def _chosen(
     """The factor of a key or a column that an option names; None without a name."""
     if name is None or (name == NO_FACTOR and option != "x"):
         return None
-    keys = [key for factor in factors for key in factor.keys]
-    column = find_name(option, name, [*keys, *rows.columns])
+    names: list[str] = []
+    for factor in factors:
+        names += factor.keys
+    names.extend(rows.columns)
+    column = find_name(option, name, names)
     for factor in factors:
         if column in factor.keys:
             return factor
     values = rows[column].tolist()
     if all(isinstance(value, str) for value in values):
-        return Factor((column,), readable_key(column), values, is_number=False)
+        return Factor(keys=(column,), name=readable_key(column), values=values, is_number=False)
     return number_factor(rows, column, option)
 
 
+def _without(factors: Sequence[Factor], shown: Sequence[Factor]) -> list[Factor]:
+    """Factors that none of the shown ones replaces."""
+    return [factor for factor in factors if not factor.is_among(shown)]
+
+
+def _is_seed(factor: Factor) -> bool:
+    return factor.keys[0] in SEEDS
+
+
+def _first_not_sampled(factors: Sequence[Factor]) -> Factor | None:
+    """The first factor that is not one of the keys of a sample, if there is one."""
+    for factor in factors:
+        if not factor.is_sample:
+            return factor
+    return None
+
+
 def _default_x(factors: Sequence[Factor], rows: pd.DataFrame) -> list[Factor]:
-    """The keys of a sample; otherwise the numbers with the most values, and no seeds if there are other keys."""
+    """The factors on x axes if no option names one: those of a sample, or one.
+
+    The one has the most values. Numbers come before texts, and other factors before seeds.
+    """
     samples = [factor for factor in factors if factor.is_sample]
     if samples:
         return samples
-    candidates = [factor for factor in factors if factor.keys[0] not in SEEDS] or factors
-    candidates = [factor for factor in candidates if factor.is_number] or candidates
-    if not candidates:
+    if not factors:
         return [number_factor(rows, "point", "x")]
+    candidates = [factor for factor in factors if not _is_seed(factor)] or factors
+    candidates = [factor for factor in candidates if factor.is_number] or candidates
     return [max(candidates, key=lambda factor: len(factor.levels))]
 
 
+def _hidden_factors(
+    left: Sequence[Factor], factors: Sequence[Factor], layout: FigureLayout
+) -> list[Factor]:
+    """The factors that a figure does not show.
+
+    Parameters
+    ----------
+    left
+        Factors that have no place in the figure.
+    factors
+        All factors.
+    layout
+        The figure.
+    """
+    shown = [factor for factor in (layout.hue, layout.panels) if factor]
+    for factor in factors:
+        is_on_x = factor.is_among(layout.x_factors)
+        if is_on_x and not factor.is_sample:
+            shown.append(factor)
+    return [factor for factor in left if not _follows_from(shown, factor)]
+
+
 def _follows_from(shown: Sequence[Factor], factor: Factor) -> bool:
-    """Whether points that look alike in a figure have the same level of a factor."""
-    level_of: dict[tuple[object, ...], object] = {}
+    """Whether points with the same levels of the shown factors have the same level of a factor."""
+    level_by_look: dict[tuple[object, ...], object] = {}
     for number, level in enumerate(factor.values):
         look = tuple(visible.values[number] for visible in shown)
-        if level_of.setdefault(look, level) != level:
+        if level_by_look.setdefault(look, level) != level:
             return False
     return True
 
 
 def _check_all_shown(layout: FigureLayout) -> None:
-    """Refuse a layout that hides keys of the sweep; it cannot show the keys of a sample."""
+    """Refuse a layout that hides keys, except for those of a sample, which no layout can show."""
     hidden = [factor.keys[0] for factor in layout.hidden if not factor.is_sample]
     if hidden:
-        raise _hides(layout, hidden)
+        raise _hidden_error(layout, hidden)
 
 
-def _hides(layout: FigureLayout, hidden: Sequence[str]) -> InputError:
-    """An error that says which keys the figure does not show, and how it can."""
-    shown = [f"{factor.keys[0]} (x)" for factor in layout.along]
+def _hidden_error(layout: FigureLayout, hidden: Sequence[str]) -> InputError:
+    """The error that names the keys that the figure does not show, and how it can show them."""
+    shown = [f"{factor.keys[0]} (x)" for factor in layout.x_factors]
     if layout.hue:
         shown.append(f"{layout.hue.keys[0]} (hue)")
     if layout.panels:
         shown.append(f"{layout.panels.keys[0]} (panels)")
-    vary = (
-        f"{', '.join(hidden)} {'varies' if len(hidden) == 1 else 'vary'} beside {', '.join(shown)}"
-    )
+    verb = "varies" if len(hidden) == 1 else "vary"
+    reason = f"{', '.join(hidden)} {verb} beside {', '.join(shown)}"
     if layout.panels:
         return input_error(
             "hue",
-            f"{vary}: expected fewer keys in the sweep file, or none to draw all values alike",
+            f"{reason}: expected fewer keys in the sweep file, or none to draw all values alike",
         )
     if len(hidden) > 1:
         advice = "expected one of them, with the others fixed in the sweep file"
     else:
         advice = f"expected {hidden[0]}"
-    return input_error("panels", f"{vary}: {advice}, or none to draw all values alike")
+    return input_error("panels", f"{reason}: {advice}, or none to draw all values alike")

@@ -6,7 +6,10 @@ import warnings
 
 
 class LeftOutWarning(UserWarning):
-    """Something is not in a figure: points without a result, keys that are not distinguished, a theory's prediction."""
+    """Something is not in a figure.
+
+    It may be a point without a result, a key that is not distinguished, or a theory's prediction.
+    """
 
 
 def warn_left_out(message: str) -> None:

@@ -27,19 +27,27 @@ def inventory(out: Path) -> list[ListEntry]:
         If the path is a file.
     """
     runs = runs_in(out)
-    size_of = Counter[str]()
+    sizes = Counter[str]()
     for run in runs:  # a run that is made again has two directories
-        size_of[run.name] += run.size
+        sizes[run.name] += run.size
     sweeps = []
     for path in folders_in(out):
-        sweep = _sweep(path, size_of)
+        sweep = _sweep(path, sizes)
         if sweep is not None:
             sweeps.append(sweep)
     return [*sweeps, *runs]
 
 
-def _sweep(path: Path, size_of: Mapping[str, int]) -> ListEntry | None:
-    """The sweep in a directory; None if there is none, or its record cannot be read."""
+def _sweep(path: Path, sizes: Mapping[str, int]) -> ListEntry | None:
+    """The sweep in a directory; None if there is none, or its record cannot be read.
+
+    Parameters
+    ----------
+    path
+        The directory.
+    sizes
+        Sizes of all runs in the folder in bytes, by their names.
+    """
     try:
         record = read_sweep_record(path)
     except InputError:
@@ -47,8 +55,9 @@ def _sweep(path: Path, size_of: Mapping[str, int]) -> ListEntry | None:
     points = dict(Counter(state.status for state in states(record)))
     sweep = record.sweep
     numbers_of_values = FlatCase()
-    for key, values in zip(sweep.keys, zip(*sweep.values, strict=True), strict=True):
-        numbers_of_values[key] = len({str(value) for value in values})
+    values_by_key = zip(*sweep.values, strict=True)
+    for key, values in zip(sweep.keys, values_by_key, strict=True):
+        numbers_of_values[key] = len(set(map(str, values)))
     return ListEntry(
         kind="sweep",
         name=path.name,
@@ -56,7 +65,7 @@ def _sweep(path: Path, size_of: Mapping[str, int]) -> ListEntry | None:
         status=worst_status(points),
         directory=path,
         age=max(time.time() - (path / RECORD_NAME).stat().st_mtime, 0.0),
-        size=sum(size_of.get(run, 0) for run in set(record.runs)),
+        size=sum(sizes.get(run, 0) for run in set(record.runs)),
         points=points,
         runs=list(record.runs),
         parameters=numbers_of_values,
@@ -72,21 +81,28 @@ def run_of_sweep(sweep: str) -> str:
 
 
 def without_members(contents: Sequence[ListEntry]) -> list[ListEntry]:
-    """Contents without the runs of sweeps, unless these have a spread or an accuracy of their own."""
-    members = {run for sweep in contents for run in sweep.runs or ()}
-    members -= {run_of_sweep(entry.name) for entry in contents}
+    """Contents of a folder without the runs of sweeps.
+
+    Runs that have a spread or an accuracy of their own remain.
+    """
+    members: set[str] = set()
+    for sweep in contents:
+        members.update(sweep.runs or ())
+    for entry in contents:
+        members.discard(run_of_sweep(entry.name))
     return [entry for entry in contents if entry.name not in members]
 
 
 def as_json(contents: Sequence[ListEntry]) -> list[dict[str, Any]]:
     """Entries as JSON objects, SI units.
 
-    ``varies`` of a run has the values by which the runs of its case differ.
+    ``varies`` of a sweep has the number of values of each key, that of a run the values by which
+    the runs of its case differ.
     """
-    keys_of = {group.case: group.keys for group in by_case(_runs(contents))}
+    keys_by_case = {group.case: group.keys for group in by_case(_runs(contents))}
     rows = []
     for entry in contents:
-        varied = entry.parameters if entry.kind == "sweep" else keys_of[entry.case]
+        varied = entry.parameters if entry.kind == "sweep" else keys_by_case[entry.case]
         row = vars(entry) | {"directory": str(entry.directory)}
         del row["parameters"]
         row["varies"] = {key: entry.parameters.get(key) for key in varied}
@@ -97,7 +113,12 @@ def as_json(contents: Sequence[ListEntry]) -> list[dict[str, Any]]:
 def listing_text(contents: Sequence[ListEntry], hidden: int = 0) -> str:
     """Entries as text: sweeps, then the runs of each case; velocities in mm/s.
 
-    The last line states the number of ``hidden`` runs of sweeps.
+    Parameters
+    ----------
+    contents
+        The entries.
+    hidden
+        Number of runs of sweeps that are not among them, for the last line.
     """
     sweeps = [entry for entry in contents if entry.kind == "sweep"]
     runs = _runs(contents)
@@ -114,13 +135,15 @@ def listing_text(contents: Sequence[ListEntry], hidden: int = 0) -> str:
 
 
 def _sweeps_text(sweeps: Sequence[ListEntry]) -> str:
+    """Sweeps as text, a line each, with the number of values of each varied key."""
     lines = [["sweep", "points", "age", "size", "case", "varies (values)"]]
     for sweep in sweeps:
-        varied = ", ".join(f"{key} ({number})" for key, number in sweep.parameters.items())
+        varied = [f"{key} ({number})" for key, number in sweep.parameters.items()]
         status = status_text(sweep.points or {})
-        lines.append([sweep.name, status, *sweep.age_and_size, sweep.case, varied])
+        lines.append([sweep.name, status, *sweep.weight, sweep.case, ", ".join(varied)])
     return aligned(lines)
 
 
 def _runs(contents: Sequence[ListEntry]) -> list[ListEntry]:
+    """The runs among some entries."""
     return [entry for entry in contents if entry.kind == "run"]

@@ -24,11 +24,15 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Predict = Callable[[Sequence[Case], str], tuple[Mapping[str, FloatArray], Mapping[str, int]]]
-"""Function of N cases and a column: predictions of models, SI units, shape (N,); remarks, with the number of cases."""
+"""Function of N cases and a column.
+
+It returns predictions by the names of models, SI units, shape (N,), and the reasons why a model
+does not apply, with the number of cases.
+"""
 _CURVE_POINTS = 61
 """Number of points of a model's curve."""
-_OF_SHAPE = ("radii", "volume_fraction", "meniscus_radius", "contact_angle")
-"""Ends of the keys that change the shape of bridges, each of which takes a tenth of a second to solve."""
+_KEYS_OF_SHAPE = ("radii", "volume_fraction", "meniscus_radius", "contact_angle")
+"""Ends of the keys that change the shape of bridges, each of which takes 0.1 s to solve."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +43,7 @@ class Theory:
     ----------
     predict
         The function that predicts.
-    done
+    finished
         Rows of the finished points.
     column
         The predicted column.
@@ -54,7 +58,7 @@ class Theory:
     """
 
     predict: Predict
-    done: pd.DataFrame
+    finished: pd.DataFrame
     column: str
     log: str
     cases: Sequence[Case]
@@ -63,21 +67,34 @@ class Theory:
 
     @classmethod
     def at_points(cls, table: SweepTable, column: str, log: str, predict: Predict) -> Theory | None:
-        """The theory of the finished points; None if it has no such number, which a warning says."""
-        done = table.finished
+        """The theory of the finished points of a sweep.
+
+        None, with a warning, if no model predicts the column.
+        """
+        finished = table.finished
         cases = list(table.cases.values())
         predicted, remarks = predict(cases, column)
         for remark, number in remarks.items():
-            warn_left_out(f"{number} of {len(done)} points: {remark}")
+            warn_left_out(f"{number} of {len(finished)} points: {remark}")
         if not predicted:
             return None
-        values = _shown(done, column, predicted)
-        return cls(predict, done, column, log, cases, values, remarks.keys())
+        return cls(
+            predict=predict,
+            finished=finished,
+            column=column,
+            log=log,
+            cases=cases,
+            values=_in_displayed_unit(finished, column, predicted),
+            remarks=remarks.keys(),
+        )
 
     def curves(
         self, rows: npt.NDArray[np.int64], places: FloatArray, x: Factor | None
     ) -> tuple[FloatArray, Mapping[str, FloatArray]]:
-        """Predictions along the x axis: a fine curve if the points differ in one number, else those of the points.
+        """Predictions along the x axis.
+
+        If the points differ in one number, this is a fine curve, otherwise the predictions for the
+        points.
 
         Parameters
         ----------
@@ -91,48 +108,73 @@ class Theory:
 
         Returns
         -------
-        along : ndarray
+        places : ndarray
             Places on the x axis.
         values : mapping
             Predictions there by the names of the models, in the displayed unit.
         """
-        of_points = places, {model: values[rows] for model, values in self.values.items()}
-        key = None if x is None else self._key_along(rows, x)
-        if x is None or key is None:
-            return of_points
-        numbers, cases = self._cases_along(rows, key)
+        at_points = places, {model: values[rows] for model, values in self.values.items()}
+        if x is None:
+            return at_points
+        key = self._varying_key(rows, x)
+        if key is None:
+            return at_points
+        numbers, cases = self._cases_between(rows, key)
         predicted, remarks = self.predict(cases, self.column)
         if predicted.keys() != self.values.keys():
-            return of_points
+            return at_points
         if not all(np.isfinite(values).all() for values in predicted.values()):
             for remark in remarks.keys() - self.remarks:
                 warn_left_out(f"the theory's curve has gaps: {remark}")
-        along = numbers
+        curve_places = numbers
         name = x.keys[0]
         if name != key:
-            along = [units_per_si(self.done, name) * derived(case)[name] for case in cases]
-        return np.array(along), _shown(self.done, self.column, predicted)
+            factor = units_per_si(self.finished, name)
+            curve_places = [factor * derived(case)[name] for case in cases]
+        curves = _in_displayed_unit(self.finished, self.column, predicted)
+        return np.array(curve_places), curves
 
-    def _key_along(self, rows: npt.NDArray[np.int64], x: Factor) -> str | None:
-        """The key that varies along an axis; None if points differ in several keys, or a curve would take long."""
-        points = self.done.iloc[rows]
-        varied = [key for key in self.done.attrs["varied"] if points[key].nunique() > 1]
+    def _varying_key(self, rows: npt.NDArray[np.int64], x: Factor) -> str | None:
+        """The only key in which points along the x axis differ.
+
+        None if there are several, or if a curve along the key would take long to compute.
+        """
+        points = self.finished.iloc[rows]
+        varied = [key for key in self.finished.attrs["varied"] if points[key].nunique() > 1]
         if len(varied) != 1:
             return None
         key: str = varied[0]
         if x.keys[0] != key and x.keys[0] not in derived(self.cases[rows[0]]):
             return None
-        if key.endswith(_OF_SHAPE) or points[key].dtype.kind not in "if":
+        if key.endswith(_KEYS_OF_SHAPE) or points[key].dtype.kind not in "if":
             return None
         return key
 
-    def _cases_along(self, rows: npt.NDArray[np.int64], key: str) -> tuple[list[float], list[Case]]:
-        """Numbers of a key between the smallest and the largest of some points, and the cases with these numbers."""
-        low = float(self.done.iloc[rows][key].min())
-        high = float(self.done.iloc[rows][key].max())
+    def _cases_between(
+        self, rows: npt.NDArray[np.int64], key: str
+    ) -> tuple[list[float], list[Case]]:
+        """Cases between points that differ in one key, for a curve.
+
+        Parameters
+        ----------
+        rows
+            Numbers of the points.
+        key
+            The key.
+
+        Returns
+        -------
+        numbers : list of float
+            Numbers of the key from the smallest to the largest of the points, in the unit of the
+            sweep file; evenly spaced on the x axis.
+        cases : list of Case
+            The cases with these numbers.
+        """
+        low = float(self.finished.iloc[rows][key].min())
+        high = float(self.finished.iloc[rows][key].max())
         spacing = np.geomspace if "x" in self.log and low > 0.0 else np.linspace
         between = spacing(low, high, _CURVE_POINTS).tolist()[1:-1]
-        unit = self.done.attrs["units"][key] or ""
+        unit = self.finished.attrs["units"][key] or ""
         first = self.cases[rows[0]]
         numbers = [low]
         cases = [_with_number(first, key, low, unit)]
@@ -147,20 +189,23 @@ class Theory:
 
 
 def _with_number(case: Case, key: str, value: float, unit: str) -> Case:
-    """The case with a number of a key in a unit; without a unit it is a plain number, in case files too."""
+    """The case with a number of a key in a unit; a plain number, as in case files, without one."""
     if unit:
         return changed_case(case, {key: f"{value!r} {unit}"})
-    return changed_case(case, {key: int(value) if value.is_integer() else value})
+    if value.is_integer():
+        return changed_case(case, {key: int(value)})
+    return changed_case(case, {key: value})
 
 
-def _shown(
-    done: pd.DataFrame, column: str, predicted: Mapping[str, FloatArray]
+def _in_displayed_unit(
+    rows: pd.DataFrame, column: str, predicted: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
-    """Predictions in the displayed unit of a column."""
-    factor = units_per_si(done, column)
+    """Predictions of a column in its displayed unit, by the names of the models."""
+    factor = units_per_si(rows, column)
     return {model: factor * values for model, values in predicted.items()}
 
 
-def units_per_si(done: pd.DataFrame, column: str) -> float:
-    """How many displayed units an SI unit of a column is."""
-    return unit_shown(done.attrs["units"].get(column) or "")[1]
+def units_per_si(rows: pd.DataFrame, column: str) -> float:
+    """How many displayed units of a column one SI unit is."""
+    _, factor = unit_shown(rows.attrs["units"].get(column) or "")
+    return factor

@@ -1,8 +1,9 @@
 """Sweeps on disk.
 
-A sweep's directory contains ``sweep.json``: the tables of the sweep's file and of its base case, and the names of its
-runs. Reading expands the file again. The status of a point is the status of its run directory. The run directories are
-beside the sweep's directory, and all sweeps of a folder share them.
+A sweep's directory contains ``sweep.json``: the tables of the sweep's file and of its base case,
+and the names of its runs. Reading expands the file again. The status of a point is the status of
+its run directory. The run directories are beside the sweep's directory, and all sweeps of a folder
+share them.
 """
 
 from __future__ import annotations
@@ -21,14 +22,26 @@ if TYPE_CHECKING:
     from walkers.inputs.sweep import SweepDefinition
 
 RECORD_NAME = "sweep.json"
+"""Name of the record in a sweep's directory."""
 _FORMAT = 4
+"""Version of the record; records of other versions are refused."""
 UNREADABLE = "ResultUnreadable"
 """Reason of points whose run is finished and whose result cannot be read."""
 
 
 @dataclass(frozen=True)
 class SweepRecord:
-    """A sweep in its directory, with the name of the run of each point."""
+    """A sweep in its directory.
+
+    Attributes
+    ----------
+    directory
+        The sweep's directory.
+    sweep
+        The sweep.
+    runs
+        The name of the run of each point.
+    """
 
     directory: Path
     sweep: SweepDefinition
@@ -49,45 +62,74 @@ def write_record(record: SweepRecord) -> None:
         "file": dict(sweep.file),
         "case": sweep.case_name,
         "base": dict(sweep.base),
+        "runs": list(record.runs),
     }
-    write_json(record.directory / RECORD_NAME, {**contents, "runs": list(record.runs)})
+    write_json(record.directory / RECORD_NAME, contents)
 
 
 def read_sweep_record(directory: str | Path) -> SweepRecord:
-    """Read the record in a sweep's directory, and expand the sweep; `InputError` if there is none."""
-    from walkers.inputs.sweep import expand
+    """Read the record in a sweep's directory, and expand the sweep.
 
-    named, directory = directory, Path(directory).resolve()
+    Raises
+    ------
+    InputError
+        If there is no record, or it cannot be read.
+    """
     try:
-        contents = read_json(directory / RECORD_NAME)
-        if contents["format"] != _FORMAT:
-            raise ValueError(f"its format is {contents['format']!r}, expected {_FORMAT}")
-        base = contents["case"], contents["base"]
-        sweep = expand(
-            contents["file"], source=f"{named}/{RECORD_NAME}", name=directory.name, base=base
-        )
-        runs = contents["runs"]
-        if len(runs) != len(sweep.rows) or not all(isinstance(run, str) for run in runs):
-            raise ValueError(f"{len(runs)} runs, expected the names of {len(sweep.rows)}")
-        return SweepRecord(directory, sweep, runs)
+        return _read_record(directory)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise input_error(
-            named, f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"
+            directory, f"not a sweep: expected a folder with a {RECORD_NAME}, such as runs/fig2"
         ) from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        text = (
-            f"{RECORD_NAME} cannot be read ({error}); run the sweep again: finished runs are kept"
-        )
-        raise input_error(named, text) from error
+        raise input_error(
+            directory,
+            f"{RECORD_NAME} cannot be read ({error}); run the sweep again: finished runs are kept",
+        ) from error
+
+
+def _read_record(directory: str | Path) -> SweepRecord:
+    """Read a record; errors of many classes if it is damaged."""
+    from walkers.inputs.sweep import expand
+
+    resolved = Path(directory).resolve()
+    contents = read_json(resolved / RECORD_NAME)
+    if contents["format"] != _FORMAT:
+        raise ValueError(f"its format is {contents['format']!r}, expected {_FORMAT}")
+    sweep = expand(
+        contents["file"],
+        source=f"{directory}/{RECORD_NAME}",
+        name=resolved.name,
+        base=(contents["case"], contents["base"]),
+    )
+    runs = contents["runs"]
+    if len(runs) != len(sweep.rows) or not all(isinstance(run, str) for run in runs):
+        raise ValueError(f"{len(runs)} runs, expected the names of {len(sweep.rows)}")
+    return SweepRecord(resolved, sweep, runs)
 
 
 def states(record: SweepRecord, *, results: bool = False) -> list[PointState]:
-    """State of each point; with ``results``, runs are read, and finished runs without a readable result have failed."""
+    """The state of each point of a sweep.
+
+    Parameters
+    ----------
+    record
+        The sweep.
+    results
+        Whether the results of finished runs are read. If they are, a finished run whose result
+        cannot be read has failed.
+    """
     points = [state_at(record.out / run) for run in record.runs]
-    for number, state in enumerate(points if results else ()):
-        if state.status == "finished" and state.directory is not None:
-            try:
-                points[number] = replace(state, result=read_results(state.directory))
-            except InputError as error:
-                points[number] = PointState("failed", state.directory, UNREADABLE, str(error))
+    if results:
+        return [_with_result(state) for state in points]
     return points
+
+
+def _with_result(state: PointState) -> PointState:
+    """The state of a point with its result if its run is finished; failed if it cannot be read."""
+    if state.status != "finished" or state.directory is None:
+        return state
+    try:
+        return replace(state, result=read_results(state.directory))
+    except InputError as error:
+        return PointState("failed", state.directory, UNREADABLE, str(error))

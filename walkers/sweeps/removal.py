@@ -14,9 +14,10 @@ from walkers.sweeps.record import RECORD_NAME, read_sweep_record
 
 
 def removals_in(out: Path, places: Sequence[Path]) -> list[Removal]:
-    """The removal of runs and sweeps in a folder of runs.
+    """The removals of runs and sweeps in a folder of runs.
 
-    With a sweep go the runs that no other sweep has; with a run go its spread and its accuracy.
+    Removing a sweep also removes the runs that no other sweep has; removing a run also removes its
+    spread and its accuracy.
 
     Parameters
     ----------
@@ -28,7 +29,8 @@ def removals_in(out: Path, places: Sequence[Path]) -> list[Removal]:
     Raises
     ------
     InputError
-        If a place has neither a run nor a sweep, a run is in progress, or a sweep in the folder cannot be read.
+        If a place has neither a run nor a sweep, a run is in progress, or a sweep in the folder
+        cannot be read.
     """
     contents = inventory(out)
     for record in out.glob(f"*/{RECORD_NAME}"):
@@ -36,19 +38,24 @@ def removals_in(out: Path, places: Sequence[Path]) -> list[Removal]:
     directories = set()
     names = set()
     for place in places:
-        for entry in _at(place, contents):
+        for entry in _entries_at(place, contents):
             directories.add(entry.directory)
             names.add(entry.name)
-    runs_of = {entry.name: entry.runs or () for entry in contents if entry.kind == "sweep"}
-    going = _with_members(names, runs_of)
-    members = going - names
-    removed = [
-        entry for entry in contents if entry.directory in directories or entry.name in members
-    ]
-    return [_removal_of(entry, going, runs_of) for entry in removed]
+    runs_of_sweeps = {}
+    for entry in contents:
+        if entry.kind == "sweep":
+            runs_of_sweeps[entry.name] = entry.runs or ()
+    removed = _with_members(names, runs_of_sweeps)
+    members = removed - names
+    removals = []
+    for entry in contents:
+        is_removed = entry.directory in directories or entry.name in members
+        if is_removed:
+            removals.append(_removal_of(entry, removed, runs_of_sweeps))
+    return removals
 
 
-def _at(place: Path, contents: Sequence[ListEntry]) -> list[ListEntry]:
+def _entries_at(place: Path, contents: Sequence[ListEntry]) -> list[ListEntry]:
     """The entry of a directory, or the entries of the run that belongs in a place."""
     resolved = place.resolve()
     entries = [entry for entry in contents if entry.directory.resolve() == resolved]
@@ -59,37 +66,54 @@ def _at(place: Path, contents: Sequence[ListEntry]) -> list[ListEntry]:
     return entries
 
 
-def _with_members(names: Collection[str], runs_of: Mapping[str, Collection[str]]) -> set[str]:
-    """Names of runs and sweeps, with the names of what goes with them.
+def _with_members(
+    names: Collection[str], runs_of_sweeps: Mapping[str, Collection[str]]
+) -> set[str]:
+    """Names of runs and sweeps, with the names of what is removed with them.
 
     Parameters
     ----------
     names
         Names of runs and sweeps.
-    runs_of
+    runs_of_sweeps
         Names of the runs of all sweeps in the folder, by the names of the sweeps.
     """
-    going = set(names)
+    removed = set(names)
     while True:
         needed: set[str] = set()
         members: set[str] = set()
-        for sweep, runs in runs_of.items():
-            if sweep in going:
+        for sweep, runs in runs_of_sweeps.items():
+            if sweep in removed:
                 members.update(runs)
             else:
                 needed.update(runs)
-            if run_of_sweep(sweep) in going:
+            if run_of_sweep(sweep) in removed:
                 members.add(sweep)
         members -= needed
-        if members <= going:
-            return going
-        going |= members
+        if members <= removed:
+            return removed
+        removed |= members
 
 
 def _removal_of(
-    entry: ListEntry, going: Collection[str], runs_of: Mapping[str, Collection[str]]
+    entry: ListEntry, removed: Collection[str], runs_of_sweeps: Mapping[str, Collection[str]]
 ) -> Removal:
-    """The removal of a run or a sweep; `InputError` if a process is computing the run."""
+    """The removal of a run or a sweep.
+
+    Parameters
+    ----------
+    entry
+        The run or the sweep.
+    removed
+        Names of all runs and sweeps that are removed.
+    runs_of_sweeps
+        As of `_with_members`.
+
+    Raises
+    ------
+    InputError
+        If a process is computing the run.
+    """
     if entry.kind == "sweep":
         remark = "a symbolic link: its target stays"
         if not entry.directory.is_symlink():
@@ -98,10 +122,8 @@ def _removal_of(
     if not is_removable(entry):
         raise input_error(entry.name, "expected a run that is not in progress")
     removal = removal_of(entry)
-    needed_by = [
-        sweep for sweep, runs in runs_of.items() if sweep not in going and entry.name in runs
-    ]
-    if needed_by:
-        text = f"needed by the sweep {needed_by[0]}, which would run it again"
-        removal = replace(removal, remark=text)
+    for sweep, runs in runs_of_sweeps.items():
+        if sweep not in removed and entry.name in runs:
+            remark = f"needed by the sweep {sweep}, which would run it again"
+            return replace(removal, remark=remark)
     return removal

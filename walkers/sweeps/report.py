@@ -41,17 +41,12 @@ def report_sweep(table: SweepTable, path: Path) -> Path:
     Raises
     ------
     InputError
-        If the file is no HTML file in an existing folder.
+        If the path is not that of an HTML file in an existing folder.
     """
     check_report(path)
     frame = table.frame
     links = [_link(table.results.get(point), path) for point in frame["point"]]
     svg, left_out = _figure(table)
-    rests: dict[str, dict[str, Any]] = {}
-    for result in table.results.values():
-        rests |= {
-            rest["key"]: rest for rest in result.about["rests_on"] if rest["key"] not in frame
-        }
     cells, same = cells_of(frame.drop(columns="run"), readable_key)
     body = fill(
         "sweep.html.j2",
@@ -61,12 +56,22 @@ def report_sweep(table: SweepTable, path: Path) -> Path:
         points=list(zip(links, cells.to_numpy().tolist(), strict=True)),
         svg=svg,
         left_out=left_out,
-        uncertain="\n".join(lines_of_rest([*rests.values()])),
+        uncertain="\n".join(lines_of_rest(_uncertain_values(table))),
         heads=list(cells),
         same=same,
     )
     write_bytes(path, page_of(frame.attrs["title"], body).encode())
     return path
+
+
+def _uncertain_values(table: SweepTable) -> list[dict[str, Any]]:
+    """The uncertain values of the runs, without those that the sweep varies."""
+    values = {}
+    for result in table.results.values():
+        for value in result.about["rests_on"]:
+            if value["key"] not in table.frame:
+                values[value["key"]] = value
+    return list(values.values())
 
 
 def _link(result: Results | None, path: Path) -> str:
@@ -77,7 +82,7 @@ def _link(result: Results | None, path: Path) -> str:
 
 
 def _figure(table: SweepTable) -> tuple[str, list[str]]:
-    """The figure as SVG, and the reasons why points are left out or look alike; no SVG if no point can be drawn."""
+    """The figure as SVG, and sentences about what it leaves out; no SVG if nothing can be drawn."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", LeftOutWarning)
         try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +21,8 @@ _TICK_DISTANCE = 0.08
 """Smallest distance of such values, relative to the range."""
 _MOST_LETTERS = 40
 """Largest number of letters of all categories on an x axis; names of more letters are slanted."""
+_SHORT_RANGE = 40.0
+"""Ratio of the ends of a logarithmic x axis below which it has ticks between powers of ten."""
 _MARGIN = 0.06
 """Free space above and below the points, relative to their range."""
 _LEAST_RANGE = 1e-4
@@ -28,7 +30,17 @@ _LEAST_RANGE = 1e-4
 
 
 def scale_x(axes: Axes, x: Factor, log: str) -> None:
-    """Set scale and ticks of the x axis; it is logarithmic for an ``x`` in ``log`` and for log-uniform samples."""
+    """Set scale and ticks of an x axis.
+
+    Parameters
+    ----------
+    axes
+        The axes.
+    x
+        The factor on the x axis. If its range is log-uniform, the axis is logarithmic.
+    log
+        Letters of logarithmic axes.
+    """
     if not x.is_number:
         _name_categories(axes, x)
         return
@@ -36,7 +48,8 @@ def scale_x(axes: Axes, x: Factor, log: str) -> None:
     if is_log:
         axes.set_xscale("log")
     if _has_few_values(x):
-        axes.set_xticks(x.levels, [f"{x.exact(level):.4g}" for level in x.levels])
+        labels = [f"{x.without_rounding(level):.4g}" for level in x.levels]
+        axes.set_xticks(x.levels, labels)
         axes.set_xticks([], minor=True)
     elif x.is_log:
         _tick_decades(axes, x)
@@ -45,25 +58,31 @@ def scale_x(axes: Axes, x: Factor, log: str) -> None:
 
 
 def _name_categories(axes: Axes, x: Factor) -> None:
-    slanted: dict[str, Any] = {}
-    if sum(len(level) for level in x.levels) > _MOST_LETTERS:
-        slanted = {"rotation": 35, "ha": "right", "rotation_mode": "anchor"}
-    axes.set_xticks(range(len(x.levels)), [plain_text(level) for level in x.levels], **slanted)
+    """Ticks with the names of categories, which are slanted if they need much space."""
+    names = [plain_text(level) for level in x.levels]
+    places = range(len(names))
+    if len("".join(x.levels)) > _MOST_LETTERS:
+        axes.set_xticks(places, names, rotation=35, ha="right", rotation_mode="anchor")
+    else:
+        axes.set_xticks(places, names)
     axes.set_xlim(-0.6, len(x.levels) - 0.4)
 
 
 def _has_few_values(x: Factor) -> bool:
     """Whether each value has a tick: there are few, and they are not too close."""
+    if x.is_sample or len(x.levels) > _FEW_TICKS:
+        return False
     distances = np.diff(x.levels)
     least = _TICK_DISTANCE * (x.levels[-1] - x.levels[0])
-    return len(x.levels) <= _FEW_TICKS and bool(np.all(distances > least)) and not x.is_sample
+    return bool(np.all(distances > least))
 
 
 def _tick_decades(axes: Axes, x: Factor) -> None:
+    """Ticks at powers of ten, and for a short range at 2 and 5 times these."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     ticks: tuple[float, ...] = (1.0,)
-    if x.levels[-1] < 40.0 * x.levels[0]:
+    if x.levels[-1] < _SHORT_RANGE * x.levels[0]:
         ticks = (1.0, 2.0, 5.0)
     axes.xaxis.set_major_locator(LogLocator(subs=ticks))
     axes.xaxis.set_major_formatter("{x:g}")
@@ -71,7 +90,7 @@ def _tick_decades(axes: Axes, x: Factor) -> None:
 
 
 def _tick_linear(axes: Axes, x: Factor) -> None:
-    """Ticks at round numbers; in the narrow panels of samples few, because long numbers would overlap."""
+    """Ticks at round numbers; few in the narrow panels of samples, where they would overlap."""
     from matplotlib.ticker import MaxNLocator
 
     integer = all(float(level).is_integer() for level in x.levels)
@@ -84,8 +103,8 @@ def _tick_linear(axes: Axes, x: Factor) -> None:
 def scale_y(axes: Axes, points: pd.DataFrame, models: Sequence[FloatArray], log: str) -> None:
     """Set scale and range of the y axis.
 
-    The range has the points, their error bars and bands, and the first model, with margins; of
-    each other model at least one point.
+    With margins, the range contains the points, their error bars and bands, all predictions of the
+    first model, and at least one prediction of each other model.
 
     Parameters
     ----------
@@ -114,10 +133,12 @@ def scale_y(axes: Axes, points: pd.DataFrame, models: Sequence[FloatArray], log:
 
 
 def _range_of(points: pd.DataFrame, models: Sequence[FloatArray]) -> tuple[float, float]:
-    """Smallest and largest number to show."""
+    """Smallest and largest number to show, see `scale_y`."""
     errors = points["error"].fillna(0.0)
-    ends = points.filter(["down", "low", "high"]).to_numpy().ravel()
-    shown = np.concatenate([points["value"] - errors, points["value"] + errors, *models[:1], ends])
+    further = points.filter(["down", "low", "high"]).to_numpy().ravel()
+    shown = np.concatenate(
+        [points["value"] - errors, points["value"] + errors, *models[:1], further]
+    )
     low = float(np.nanmin(shown))
     high = float(np.nanmax(shown))
     for model in models[1:]:
@@ -129,7 +150,7 @@ def _range_of(points: pd.DataFrame, models: Sequence[FloatArray]) -> tuple[float
 
 
 def _widened(low: float, high: float) -> tuple[float, float]:
-    """A range that is not as narrow as rounding errors."""
+    """The range itself, or a wider one if it is as narrow as rounding errors."""
     middle = (low + high) / 2.0
     if high - low > _LEAST_RANGE * abs(middle) and high - low >= ROUNDING:
         return low, high

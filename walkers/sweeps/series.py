@@ -1,10 +1,10 @@
-"""The points of a sweep in one panel of its figure: symbols, error bars, bands, lines and predictions."""
+"""The points of a sweep in one panel of its figure: symbols, error bars, bands, lines, theory."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -21,22 +21,76 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
-_UP: dict[str, Any] = {"marker": "o", "color": "0.3", "label": "started facing right (up)"}
-_DOWN: dict[str, Any] = {"marker": "v", "color": "0.3", "label": "started facing left (down)"}
+Style: TypeAlias = dict[str, Any]
+"""Keyword arguments of matplotlib: colour, symbol and its size."""
+_UP: Style = {"marker": "o", "color": "0.3", "label": "started facing right (up)"}
+_DOWN: Style = {"marker": "v", "color": "0.3", "label": "started facing left (down)"}
 _MARKERS = "osD^vXP<>*"
+"""Symbols of the colours."""
 _MODEL_LINES = ("--", ":")
+"""Lines of the models."""
 _MODEL_MARKERS = ("_", "+")
 """Symbols of the models where points are not joined by lines."""
 _MOST_COLOURS = 10
 """Number of colours in the style of the project."""
-_MOST_ASIDE = 0.12
+_LARGEST_OFFSET = 0.12
 """Largest distance of the symbols of two colours in a category; categories have the distance 1."""
 _BAND_OPACITY = 0.25
+"""Opacity of bands, from 0 to 1."""
+
+
+@dataclass(frozen=True)
+class Colours:
+    """Colours and symbols that tell the levels of a factor apart.
+
+    Attributes
+    ----------
+    factor
+        The factor; None: all points have the same colour.
+    styles
+        Colour, symbol and its size by the level; for the level None without a factor.
+    """
+
+    factor: Factor | None
+    styles: Mapping[Any, Style]
+
+    @classmethod
+    def of_factor(cls, factor: Factor | None, *, hollow: bool) -> Colours:
+        """The colours of the levels of a factor; symbols are ``hollow`` or filled."""
+        levels: list[Any] = factor.levels if factor else [None]
+        styles = {}
+        for number, (level, colour) in enumerate(zip(levels, _colours(len(levels)), strict=True)):
+            # Symbols that are drawn later are smaller, so that those of coinciding points are seen.
+            later = len(levels) - 1 - number
+            styles[level] = {
+                "marker": _MARKERS[number % len(_MARKERS)],
+                "color": colour,
+                "mfc": "none" if hollow else colour,
+                "ms": 4.5 + min(1.0, 4.0 / len(levels)) * later,
+            }
+        return cls(factor, styles)
+
+    def are_drawn(self, level: Any, drawn: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+        """Which of the drawn points have the colour of a level."""
+        if self.factor is None:
+            return drawn
+        return drawn & self.factor.has_level(level)
+
+
+def _colours(number: int) -> list[Any]:
+    """Colours of the project's style, or of a colour map if these are not enough."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    if number > _MOST_COLOURS:
+        return list(colormaps["turbo"](np.linspace(0.0, 0.92, number)))
+    # "C0" would be looked up when the figure is drawn, in the style of whoever draws it then.
+    return [to_hex(f"C{place}") for place in range(number)]
 
 
 @dataclass(frozen=True)
 class Series:
-    """Points that are drawn alike.
+    """Points of one colour in a panel.
 
     Attributes
     ----------
@@ -53,31 +107,34 @@ class Series:
     places: npt.NDArray[np.float64]
 
     @classmethod
-    def of_points(cls, x: Factor, drawn: npt.NDArray[np.bool_], aside: float = 0.0) -> Series:
-        """The series of the points that are ``drawn``, moved ``aside`` on the x axis."""
+    def of_points(cls, x: Factor, drawn: npt.NDArray[np.bool_], offset: float = 0.0) -> Series:
+        """The series of the points that are ``drawn``, moved by an offset on the x axis."""
         values = x.values
         if not x.is_number:
             values = [x.levels.index(level) for level in x.values]
-        places = np.array(values, dtype=float) + aside
+        places = np.array(values, dtype=float) + offset
         rows = np.flatnonzero(drawn)
         rows = rows[np.argsort(places[rows], kind="stable")]
         return cls(x, rows, places[rows])
 
     @property
     def is_line(self) -> bool:
-        """Whether lines join the points: each has a place of its own along a number that was chosen."""
+        """Whether lines may join the points.
+
+        Each point must have a place of its own along a number that was chosen, not drawn.
+        """
         x = self.x
         if not x.is_number or x.is_sample or x.keys[0] in SEEDS:
             return False
         return len(set(self.places)) == len(self.rows) > 1
 
 
-def points_of(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.DataFrame]:
-    """What is drawn of a column, in its displayed unit.
+def points_of(finished: pd.DataFrame, column: str, down: str | None) -> tuple[str, pd.DataFrame]:
+    """The numbers of a column that are drawn, in its displayed unit.
 
     Parameters
     ----------
-    done
+    finished
         The finished points of a sweep.
     column
         A column of their table.
@@ -93,7 +150,7 @@ def points_of(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, p
     """
     import pandas as pd
 
-    points = pd.DataFrame({"error": np.full(len(done), np.nan)})
+    points = pd.DataFrame({"error": np.full(len(finished), np.nan)})
     sources = {
         "value": column,
         "error": scatter_of(column),
@@ -102,58 +159,43 @@ def points_of(done: pd.DataFrame, column: str, down: str | None) -> tuple[str, p
         "down": down,
     }
     for name, source in sources.items():
-        if source and source in done and done[source].notna().any():
-            points[name] = number_factor(done, source, "y").values
-    factor = number_factor(done, column, "y")
+        if source and source in finished and finished[source].notna().any():
+            points[name] = number_factor(finished, source, "y").values
+    factor = number_factor(finished, column, "y")
     if "down" in points:  # the figure has walkers of both directions
         factor = replace(factor, name=LABELS[column]["both"])
     return factor.label, points
 
 
-def level_styles(hue: Factor | None, *, hollow: bool) -> dict[Any, dict[str, Any]]:
-    """Colour, symbol and its size for each level of a factor; for the level None without a factor."""
-    from matplotlib import colormaps
-    from matplotlib.colors import to_hex
-
-    levels: list[Any] = hue.levels if hue else [None]
-    # "C0" would be looked up when the figure is drawn, in the style of whoever draws it then.
-    colours: list[Any] = [to_hex(f"C{number}") for number in range(len(levels))]
-    if len(levels) > _MOST_COLOURS:
-        colours = list(colormaps["turbo"](np.linspace(0.0, 0.92, len(levels))))
-    looks = {}
-    for number, level in enumerate(levels):
-        # Symbols that are drawn later are smaller, so that those of coinciding points are seen.
-        later = len(levels) - 1 - number
-        looks[level] = {
-            "marker": _MARKERS[number % len(_MARKERS)],
-            "color": colours[number],
-            "mfc": "none" if hollow else colours[number],
-            "ms": 4.5 + min(1.0, 4.0 / len(levels)) * later,
-        }
-    return looks
-
-
 def category_offset(number: int, count: int) -> float:
-    """Where the symbols of one of several colours are beside their category."""
-    distance = min(_MOST_ASIDE, 0.6 / count)
+    """Distance of the symbols of a colour from the middle of their category.
+
+    Parameters
+    ----------
+    number
+        Number of the colour, from 0.
+    count
+        Number of colours.
+    """
+    distance = min(_LARGEST_OFFSET, 0.6 / count)
     return (number - (count - 1) / 2.0) * distance
 
 
 def draw_series(
-    axes: Axes, series: Series, points: pd.DataFrame, look: Mapping[str, Any], *, joined: bool
+    axes: Axes, series: Series, points: pd.DataFrame, style: Style, *, joined: bool
 ) -> None:
     """Draw points with error bars, bands, and the points of walkers that face down.
 
     Parameters
     ----------
     axes
-        Where.
+        The axes of the panel.
     series
         The points to draw.
     points
         All points, as from `points_of`.
-    look
-        Colour and symbol.
+    style
+        Their colour and symbol.
     joined
         Whether lines join the points if they are a line.
     """
@@ -161,14 +203,14 @@ def draw_series(
     bars = shown["error"] if errors_seen(points["error"], points["value"]) else None
     line = "-" if series.is_line and joined else "none"
     axes.errorbar(
-        series.places, shown["value"].to_numpy(), yerr=bars, capsize=2, lw=0.9, ls=line, **look
+        series.places, shown["value"].to_numpy(), yerr=bars, capsize=2, lw=0.9, ls=line, **style
     )
     if "low" in shown:
-        _draw_band(axes, series, shown, look["color"])
+        _draw_band(axes, series, shown, style["color"])
     if "down" in shown:
         line = "--" if series.is_line else "none"
-        look_down = {**look, "marker": _DOWN["marker"], "mfc": "none"}
-        axes.plot(series.places, shown["down"], lw=0.9, ls=line, **look_down)
+        style_down = {**style, "marker": _DOWN["marker"], "mfc": "none"}
+        axes.plot(series.places, shown["down"], lw=0.9, ls=line, **style_down)
 
 
 def _draw_band(axes: Axes, series: Series, shown: pd.DataFrame, colour: Any) -> None:
@@ -186,34 +228,29 @@ def _draw_band(axes: Axes, series: Series, shown: pd.DataFrame, colour: Any) -> 
 def draw_theory(axes: Axes, series: Series, theory: Theory, colour: Any) -> None:
     """Draw the predictions of all models for a series."""
     x = series.x if series.is_line else None
-    along, models = theory.curves(series.rows, series.places, x)
+    places, models = theory.curves(series.rows, series.places, x)
     for number, values in enumerate(models.values()):
-        axes.plot(along, values, zorder=1, **_look_of_model(number, series.is_line, colour))
+        axes.plot(places, values, zorder=1, **_model_style(number, series.is_line, colour))
 
 
-def _look_of_model(number: int, is_line: bool, colour: Any) -> dict[str, Any]:
+def _model_style(number: int, is_line: bool, colour: Any) -> Style:
+    """How the predictions of a model are drawn: as a line, or as symbols."""
     if is_line:
         return {"color": colour, "lw": 0.9, "ls": _MODEL_LINES[number]}
     return {"color": colour, "lw": 0.9, "ls": "none", "marker": _MODEL_MARKERS[number], "ms": 9}
 
 
 def draw_legend(
-    figure: Figure,
-    hue: Factor | None,
-    looks: Mapping[Any, Mapping[str, Any]],
-    models: Sequence[str] = (),
-    *,
-    down: bool,
-    band: str,
+    figure: Figure, colours: Colours, models: Sequence[str] = (), *, down: bool, band: str
 ) -> None:
-    """Draw a legend of colours, models and bands below all panels; none if there is nothing to explain.
+    """Draw a legend of colours, models and bands below all panels, if there is any to explain.
 
     Parameters
     ----------
     figure
         The figure, whose panels are drawn.
-    hue, looks
-        The factor of the colours, and colours and symbols of its levels.
+    colours
+        The colours.
     models
         Names of the models.
     down
@@ -223,17 +260,14 @@ def draw_legend(
     """
     from matplotlib.lines import Line2D
 
-    handles: list[Line2D] = []
-    if hue is not None:
-        for level, look in looks.items():
-            handles.append(Line2D([], [], ls="none", label=plain_text(hue.text(level)), **look))
+    handles = _colour_handles(colours)
     if down:
         handles.append(Line2D([], [], ls="none", **_UP))
         handles.append(Line2D([], [], ls="none", mfc="none", **_DOWN))
-    drawn = {line.get_linestyle() for axes in figure.axes for line in axes.lines}
+    line_styles = _line_styles(figure)
     for number, model in enumerate(models):
-        look = _look_of_model(number, _MODEL_LINES[number] in drawn, "0.3")
-        handles.append(Line2D([], [], label=model, **look))
+        style = _model_style(number, _MODEL_LINES[number] in line_styles, "0.3")
+        handles.append(Line2D([], [], label=model, **style))
     if band:
         handles.append(Line2D([], [], lw=5.0, alpha=_BAND_OPACITY, color="0.3", label=band))
     if not handles:
@@ -241,5 +275,26 @@ def draw_legend(
     longest = max(len(str(handle.get_label())) for handle in handles)
     columns = int(13.0 * figure.get_figwidth() / (longest + 6))
     columns = max(1, min(len(handles), columns))
-    title = plain_text(hue.name) if hue is not None else None
+    title = plain_text(colours.factor.name) if colours.factor is not None else None
     figure.legend(handles=handles, loc="outside lower center", title=title, ncols=columns)
+
+
+def _colour_handles(colours: Colours) -> list[Line2D]:
+    """The symbols of colours in the legend."""
+    from matplotlib.lines import Line2D
+
+    handles: list[Line2D] = []
+    if colours.factor is None:
+        return handles
+    for level, style in colours.styles.items():
+        label = plain_text(colours.factor.text(level))
+        handles.append(Line2D([], [], ls="none", label=label, **style))
+    return handles
+
+
+def _line_styles(figure: Figure) -> set[Any]:
+    """The styles of all lines in a figure."""
+    styles: set[Any] = set()
+    for axes in figure.axes:
+        styles.update(line.get_linestyle() for line in axes.lines)
+    return styles
