@@ -69,8 +69,12 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
         raise input_error(
             frame.attrs["sweep"], "expected a finished run of a pile: no point is finished"
         )
-    conditions = [rows for _, rows in seed_groups(done)]
-    texts = pd.concat([key_texts(rows.head(1)) for rows in conditions])
+    conditions = []
+    first_points = []
+    for _, rows in seed_groups(done):
+        conditions.append(rows)
+        first_points.append(key_texts(rows.head(1)))
+    texts = pd.concat(first_points)
     texts = texts.drop(columns=list(SEEDS), errors="ignore")
     usual = {key: _usual_text(column) for key, column in texts.items()}
     for number, rows in enumerate(conditions):
@@ -119,13 +123,15 @@ def summarise_climbs(results: Sequence[Results], within: float | None = None) ->
     for number, result in enumerate(results):
         if "climbs" not in result:
             raise input_error(result.directory, "expected a finished run of a pile")
-        pile_rows.append({name: result[name] for name in ("beads", "large", "driven")})
-        tables.append(result.table("clusters").assign(pile=number))
+        pile_rows.append(
+            {"beads": result["beads"], "large": result["large"], "driven": result["driven"]}
+        )
+        clusters_of_run = result.table("clusters")
+        tables.append(clusters_of_run.assign(pile=number, run=result.directory.name))
     piles = pd.DataFrame(pile_rows)
     clusters = pd.concat(tables)
     climbs = clusters[clusters["climbed"].astype(bool)]
-    names = [results[pile].directory.name for pile in climbs["pile"]]
-    records: Any = climbs.assign(run=names).to_dict("records")
+    records: Any = climbs.to_dict("records")
     summary = climb_summary(piles, climbs, within)
     summary["each"] = [json_numbers(record) for record in records]
     summary["guessed"] = guesses(results[0].about["rests_on"])

@@ -68,12 +68,12 @@ def figure_layout(
     x = _chosen("x", options.x, factors, rows)
     hue = _chosen("hue", options.hue, factors, rows)
     panels = _chosen("panels", options.panels, factors, rows)
-    chosen = [factor for factor in (x, hue, panels) if factor is not None]
-    left = _without(factors, chosen)
+    chosen = _existing(x, hue, panels)
+    left = [factor for factor in factors if not factor.is_among(chosen)]
     x_factors = [x] if x else _default_x(left, rows)
     if len(x_factors) > 1 and panels:
         raise input_error("panels", "expected x too: the samples have a panel for each key")
-    left = [factor for factor in left if factor not in x_factors and not _is_seed(factor)]
+    left = [factor for factor in left if not (factor in x_factors or _is_seed(factor))]
     if options.hue is None:
         hue = _first_not_sampled(left)
     hidden = _hidden_factors(left, factors, FigureLayout(x_factors, hue, panels))
@@ -120,9 +120,9 @@ def _chosen(
     return number_factor(rows, column, option)
 
 
-def _without(factors: Sequence[Factor], shown: Sequence[Factor]) -> list[Factor]:
-    """Factors that none of the shown ones replaces."""
-    return [factor for factor in factors if not factor.is_among(shown)]
+def _existing(*factors: Factor | None) -> list[Factor]:
+    """The factors that are not None."""
+    return [factor for factor in factors if factor is not None]
 
 
 def _is_seed(factor: Factor) -> bool:
@@ -138,18 +138,20 @@ def _first_not_sampled(factors: Sequence[Factor]) -> Factor | None:
 
 
 def _default_x(factors: Sequence[Factor], rows: pd.DataFrame) -> list[Factor]:
-    """The factors on x axes if no option names one: those of a sample, or one.
+    """The factors on x axes if no option names one: those of a sample, otherwise a single one.
 
-    The one has the most values. Numbers come before texts, and other factors before seeds.
+    Seeds come last, numbers come before texts, and many values before few.
     """
     samples = [factor for factor in factors if factor.is_sample]
     if samples:
         return samples
     if not factors:
         return [number_factor(rows, "point", "x")]
-    candidates = [factor for factor in factors if not _is_seed(factor)] or factors
-    candidates = [factor for factor in candidates if factor.is_number] or candidates
-    return [max(candidates, key=lambda factor: len(factor.levels))]
+
+    def priority(factor: Factor) -> tuple[bool, bool, int]:
+        return not _is_seed(factor), factor.is_number, len(factor.levels)
+
+    return [max(factors, key=priority)]
 
 
 def _hidden_factors(
@@ -166,7 +168,7 @@ def _hidden_factors(
     layout
         The figure.
     """
-    shown = [factor for factor in (layout.hue, layout.panels) if factor]
+    shown = _existing(layout.hue, layout.panels)
     for factor in factors:
         is_on_x = factor.is_among(layout.x_factors)
         if is_on_x and not factor.is_sample:

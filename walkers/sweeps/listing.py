@@ -52,7 +52,10 @@ def _sweep(path: Path, sizes: Mapping[str, int]) -> ListEntry | None:
         record = read_sweep_record(path)
     except InputError:
         return None
-    points = dict(Counter(state.status for state in states(record)))
+    points = Counter(state.status for state in states(record))
+    size = 0
+    for run in set(record.runs):
+        size += sizes.get(run, 0)
     sweep = record.sweep
     numbers_of_values = FlatCase()
     values_by_key = zip(*sweep.values, strict=True)
@@ -65,8 +68,8 @@ def _sweep(path: Path, sizes: Mapping[str, int]) -> ListEntry | None:
         status=worst_status(points),
         directory=path,
         age=max(time.time() - (path / RECORD_NAME).stat().st_mtime, 0.0),
-        size=sum(sizes.get(run, 0) for run in set(record.runs)),
-        points=points,
+        size=size,
+        points=dict(points),
         runs=list(record.runs),
         parameters=numbers_of_values,
     )
@@ -99,7 +102,7 @@ def as_json(contents: Sequence[ListEntry]) -> list[dict[str, Any]]:
     ``varies`` of a sweep has the number of values of each key, that of a run the values by which
     the runs of its case differ.
     """
-    keys_by_case = {group.case: group.keys for group in by_case(_runs(contents))}
+    keys_by_case = {group.case: group.keys for group in by_case(_of_kind("run", contents))}
     rows = []
     for entry in contents:
         varied = entry.parameters if entry.kind == "sweep" else keys_by_case[entry.case]
@@ -120,8 +123,8 @@ def listing_text(contents: Sequence[ListEntry], hidden: int = 0) -> str:
     hidden
         Number of runs of sweeps that are not among them, for the last line.
     """
-    sweeps = [entry for entry in contents if entry.kind == "sweep"]
-    runs = _runs(contents)
+    sweeps = _of_kind("sweep", contents)
+    runs = _of_kind("run", contents)
     blocks = []
     totals = [counted(len(runs), "run")]
     if sweeps:
@@ -144,6 +147,6 @@ def _sweeps_text(sweeps: Sequence[ListEntry]) -> str:
     return aligned(lines)
 
 
-def _runs(contents: Sequence[ListEntry]) -> list[ListEntry]:
-    """The runs among some entries."""
-    return [entry for entry in contents if entry.kind == "run"]
+def _of_kind(kind: str, contents: Sequence[ListEntry]) -> list[ListEntry]:
+    """The entries that are sweeps, or those that are runs."""
+    return [entry for entry in contents if entry.kind == kind]

@@ -13,7 +13,6 @@ from __future__ import annotations
 import heapq
 from collections.abc import Collection, Hashable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from math import ceil
 
 from walkers.inputs.tables.case import Case
@@ -68,12 +67,11 @@ def pack(
     longest_seconds
         Largest predicted time of a deck of several points, s.
     """
-    points_by_key: dict[Hashable, list[int]] = {}
-    for number, case in enumerate(cases):
-        points_by_key.setdefault(sharing_key(case), []).append(number)
-    groups = list(points_by_key.values())
-    whole = sum(PlannedDeck.of_points(group, cases).seconds for group in groups)
-    longest = max(PlannedDeck.of_points([number], cases).seconds for number in range(len(cases)))
+    groups = _sharing_points(cases)
+    whole = 0.0
+    for group in groups:
+        whole += PlannedDeck.of_points(group, cases).seconds
+    longest = max(predicted_seconds(case, pairs_of_beads(case)) for case in cases)
     trials = _TRIALS if len(groups) < len(cases) else 1
     plans = []
     spans = []
@@ -83,10 +81,23 @@ def pack(
         for group in groups:
             decks += _split_group(group, cases, length)
         plans.append(decks)
-        spans.append(makespan([deck.seconds for deck in decks], workers))
+        spans.append(makespan(seconds_of(decks), workers))
     good = [number for number, span in enumerate(spans) if span <= _AS_GOOD * min(spans)]
     smallest_decks = plans[max(good)]
     return sorted(smallest_decks, key=lambda deck: -deck.seconds)
+
+
+def _sharing_points(cases: Sequence[Case]) -> list[list[int]]:
+    """Numbers of the points in groups that can share a deck."""
+    groups: dict[Hashable, list[int]] = {}
+    for number, case in enumerate(cases):
+        groups.setdefault(sharing_key(case), []).append(number)
+    return list(groups.values())
+
+
+def seconds_of(decks: Iterable[PlannedDeck]) -> list[float]:
+    """Predicted times of decks on one core, s."""
+    return [deck.seconds for deck in decks]
 
 
 def _split_group(
@@ -112,8 +123,12 @@ def _split_group(
 
 def parts_of(points: Sequence[int], count: int) -> list[Sequence[int]]:
     """Split a sequence into consecutive parts whose lengths differ by at most one."""
-    edges = [len(points) * number // count for number in range(count + 1)]
-    return [points[start:end] for start, end in pairwise(edges)]
+    parts = []
+    for number in range(count):
+        start = len(points) * number // count
+        end = len(points) * (number + 1) // count
+        parts.append(points[start:end])
+    return parts
 
 
 def makespan(seconds: Iterable[float], workers: int) -> float:
@@ -150,10 +165,10 @@ def unfinished_parts(
     finished
         Numbers of the finished points of the sweep.
     """
-    done = [number in finished for number in points]
-    if not any(done):
+    done = set(points).intersection(finished)
+    if not done:
         return [PlannedDeck.of_points(points, cases)]
-    if all(done):
+    if len(done) == len(points):
         return []
     first, second = parts_of(points, 2)
     return [

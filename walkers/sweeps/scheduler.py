@@ -42,6 +42,7 @@ from walkers.sweeps.packing import (
     makespan,
     pack,
     parts_of,
+    seconds_of,
     unfinished_parts,
 )
 from walkers.sweeps.record import (
@@ -200,13 +201,15 @@ class SweepPlan:
 
         Python works for one deck at a time, while engines of other decks run.
         """
-        engines = makespan([deck.seconds for deck in self.decks], self.options.decks_at_once)
+        engines = makespan(seconds_of(self.decks), self.options.decks_at_once)
         return max(engines + PROGRAM_SECONDS, PROGRAM_SECONDS + self.overhead)
 
     @property
     def core_seconds_apart(self) -> float:
         """Predicted CPU time in s, of the program too, if each missing point had its own deck."""
-        engines = sum(predicted_seconds(case) * case.run.ranks for case in self.missing)
+        engines = 0.0
+        for case in self.missing:
+            engines += predicted_seconds(case) * case.run.ranks
         return PROGRAM_SECONDS + self.overhead + engines
 
     def as_text(self) -> str:
@@ -253,10 +256,13 @@ def plan_sweep(
     if options.site is not None:
         check_path(record.directory)
     point_states = states(record)
-    statuses = [state.status for state in point_states]
     final = _recorded_failures(record, point_states, options.final)
     settled = {failure.point for failure in final}
-    settled.update(point for point, status in enumerate(statuses) if status == "finished")
+    statuses = []
+    for point, state in enumerate(point_states):
+        statuses.append(state.status)
+        if state.status == "finished":
+            settled.add(point)
     # A shared deck stays well below the time limit, because a single point may be close to it.
     longest = min(LONGEST_SECONDS, 0.5 * (options.time_limit or inf))
     decks: list[PlannedDeck] = []
@@ -387,7 +393,8 @@ def _warn_if_replaced(record: SweepRecord) -> None:
 
 def _measure_finished(record: SweepRecord) -> None:
     """Measure finished runs again whose results are out of date."""
-    for place in {record.out / run for run in record.runs}:
+    for run in set(record.runs):
+        place = record.out / run
         if is_finished(place):
             # A run that cannot be measured is among the failures.
             with suppress(WalkersError, OSError, ValueError):
@@ -440,7 +447,7 @@ class _SweepLoop:
         self.shares: dict[PlannedDeck, float] = {}
         self.same_failures: Counter[tuple[str, str]] = Counter()
         self.start = time.perf_counter()
-        self.seconds = sum(deck.seconds for deck in plan.decks)
+        self.seconds = sum(seconds_of(plan.decks))
         self.finished_before = plan.statuses.count("finished")
         self.done = self.finished_before
 

@@ -139,7 +139,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         points is out of its limits.
     """
     check_limits("points", points, 2, 4096)
-    varied = [value for value in case.origins if value.range is not None]
+    varied = _uncertain_values(case)
     if not varied:
         raise input_error(
             case.name,
@@ -161,6 +161,11 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
     }
     name = spread_of(run_place(case, find_engine(engine), Path())).name
     return expand(file, source=case.name, name=name, base=(case.name, case.document))
+
+
+def _uncertain_values(case: Case) -> list[Origin]:
+    """The values of a case that have a range."""
+    return [value for value in case.origins if value.range is not None]
 
 
 def _range_of(value: Origin) -> dict[str, list[Any]]:
@@ -275,7 +280,7 @@ def spread_in(
     else:
         names = [name for name in MAIN if name in table]
         counts = {}
-    varied = tuple(value for value in case.origins if value.range is not None)
+    varied = _uncertain_values(case)
     keys = [value.key for value in varied]
     bands = {}
     depends = {}
@@ -285,7 +290,7 @@ def spread_in(
         depends[name] = rank_correlations(whole, name, keys) or {}
     return Spread(
         directory=directory,
-        varied=varied,
+        varied=tuple(varied),
         held=held_of(case.origins),
         bands=bands,
         depends=depends,

@@ -22,6 +22,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from math import nan
 from pathlib import Path
+from textwrap import indent
 from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, input_error, suggestion
@@ -194,8 +195,11 @@ def _frame(sweep: SweepDefinition, points: Sequence[PointState]) -> pd.DataFrame
     }
     rows = [_row(number, sweep, state) for number, state in enumerate(points)]
     frame = pd.DataFrame(rows, columns=list(described))
-    frame.attrs["units"] = {name: unit for name, (unit, _) in described.items()}
-    frame.attrs["meanings"] = {name: meaning for name, (_, meaning) in described.items()}
+    frame.attrs["units"] = {}
+    frame.attrs["meanings"] = {}
+    for name, (unit, meaning) in described.items():
+        frame.attrs["units"][name] = unit
+        frame.attrs["meanings"][name] = meaning
     frame.attrs["sweep"] = sweep.name
     frame.attrs["title"] = sweep.title or sweep.name
     frame.attrs["until_below"] = sweep.until_below
@@ -235,14 +239,11 @@ def _declared_numbers(sweep: SweepDefinition) -> list[str]:
         modules = modules_of(next(sweep.cases()))
     except InputError:
         return []
-    groups = [module.NAME for module in modules]
-    names: list[str] = []
-    for group in [*groups, "drive"]:
-        for number in GROUPS[group]:
-            name = number.name
-            if not name.endswith("*"):
-                names.append(name)
-    return names
+    numbers = []
+    for module in modules:
+        numbers += GROUPS[module.NAME]
+    numbers += GROUPS["drive"]
+    return [number.name for number in numbers if not number.name.endswith("*")]
 
 
 def _row(number: int, sweep: SweepDefinition, state: PointState) -> dict[str, Any]:
@@ -272,8 +273,11 @@ def seed_groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFr
     rows : pandas.DataFrame
         The rows of the group.
     """
-    others = [name for name in frame.attrs["varied"] if name not in SEEDS]
-    keys = [name for name in others if frame[name].nunique(dropna=False) > 1]
+    keys = []
+    for name in frame.attrs["varied"]:
+        differs = frame[name].nunique(dropna=False) > 1
+        if differs and name not in SEEDS:
+            keys.append(name)
     if not keys:
         yield {}, frame
         return
@@ -297,7 +301,7 @@ def sides_differ(frame: pd.DataFrame) -> bool:
 
 
 def main_columns(frame: pd.DataFrame) -> list[str]:
-    """The main results in order of preference: the `headline` of the points, then `_RESULTS`."""
+    """The main results in order of preference: the `headline` of points, then the other ones."""
     if "velocity" not in frame:
         return list(_RESULTS)
     finished: Any = frame.dropna(subset="velocity").to_dict("records")
@@ -633,5 +637,5 @@ def describe_status(frame: pd.DataFrame) -> str:
         point = f"  interrupted  point {row.point}"
         lines.append(f"{point}: {row.message}")
     if frame.attrs["until_below"] is not None:
-        lines += [f"  {line}" for line in short_text(thresholds(frame)).splitlines()]
+        lines.append(indent(short_text(thresholds(frame)), "  "))
     return "\n".join(lines)
