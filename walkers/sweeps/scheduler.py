@@ -18,7 +18,6 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -263,8 +262,10 @@ def plan_sweep(
         statuses.append(state.status)
         if state.status == "finished":
             settled.add(point)
-    # A shared deck stays well below the time limit, because a single point may be close to it.
-    longest = min(LONGEST_SECONDS, 0.5 * (options.time_limit or inf))
+    longest = LONGEST_SECONDS
+    if options.time_limit:
+        # A shared deck stays well below the time limit, because a single point may be close to it.
+        longest = min(longest, 0.5 * options.time_limit)
     decks: list[PlannedDeck] = []
     for deck in pack(cases, options.decks_at_once, longest):
         decks += unfinished_parts(deck.points, cases, settled)

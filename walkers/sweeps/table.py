@@ -33,6 +33,7 @@ from walkers.postprocess.measure.numbers import headline
 from walkers.postprocess.measure.quantities import (
     ENDS,
     GROUPS,
+    Quantity,
     described_columns,
     is_declared,
     unit_shown,
@@ -239,7 +240,7 @@ def _declared_numbers(sweep: SweepDefinition) -> list[str]:
         modules = modules_of(next(sweep.cases()))
     except InputError:
         return []
-    numbers = []
+    numbers: list[Quantity] = []
     for module in modules:
         numbers += GROUPS[module.NAME]
     numbers += GROUPS["drive"]
