@@ -64,14 +64,14 @@ def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
     """
     import pandas as pd
 
-    done = frame[frame["status"] == "finished"]
-    if done.empty:
+    finished = frame[frame["status"] == "finished"]
+    if finished.empty:
         raise input_error(
             frame.attrs["sweep"], "expected a finished run of a pile: no point is finished"
         )
     conditions = []
     first_points = []
-    for _, rows in seed_groups(done):
+    for _, rows in seed_groups(finished):
         conditions.append(rows)
         first_points.append(key_texts(rows.head(1)))
     texts = pd.concat(first_points)
@@ -154,19 +154,19 @@ def climb_summary(
     """
     if within is None:
         counted_until = inf
-        at = _longest_common_time(piles, climbs)
+        deadline = _longest_common_time(piles, climbs)
     else:
         counted_until = within
-        at = within
+        deadline = within
     in_corners = climbs["walls"] >= WALLS_OF_CORNER
     parts = {
         "on_plain_walls": ~in_corners,
         "in_corners": in_corners,
         "out_of_pile": climbs["out_of_pile"].astype(bool),
     }
-    summary = climb_statistics(piles, climbs, counted_until, at)
+    summary = climb_statistics(piles, climbs, counted_until, deadline)
     for name in PARTS:
-        summary[name] = climb_statistics(piles, climbs[parts[name]], counted_until, at)
+        summary[name] = climb_statistics(piles, climbs[parts[name]], counted_until, deadline)
     return summary
 
 
@@ -183,7 +183,7 @@ def _longest_common_time(piles: pd.DataFrame, climbs: pd.DataFrame) -> float:
 
 
 def climb_statistics(
-    piles: pd.DataFrame, climbs: pd.DataFrame, counted_until: float, at: float
+    piles: pd.DataFrame, climbs: pd.DataFrame, counted_until: float, deadline: float
 ) -> dict[str, Any]:
     """Statistics of climbs over several piles that differ only in their seed.
 
@@ -196,7 +196,7 @@ def climb_statistics(
         Rows of the tables ``clusters``, with the index of their ``pile``.
     counted_until
         Time in s up to which climbs count.
-    at
+    deadline
         Time in s by which a pile has climbed or not.
 
     Returns
@@ -204,7 +204,7 @@ def climb_statistics(
     dict
         The items of `survival` for first climbs, and those of `leaders` and:
 
-        - ``within``: the time ``at``, s
+        - ``within``: the time ``deadline``, s
         - ``runs``: number of runs
         - ``seconds``: time of drive of all runs, each up to ``counted_until``
         - ``climbs``: number of climbs
@@ -222,10 +222,10 @@ def climb_statistics(
     first = firsts.set_index("pile")["qualified"].astype(float).reindex(piles.index, fill_value=inf)
     seconds = float(watched.sum())
     return {
-        "within": at,
+        "within": deadline,
         "runs": len(piles),
         "seconds": seconds,
-        **survival(np.array(first, dtype=float), np.array(watched, dtype=float), at),
+        **survival(np.array(first, dtype=float), np.array(watched, dtype=float), deadline),
         "climbs": len(counted),
         **_rate(len(counted), seconds),
         "dispersion": _dispersion(counted, watched),
@@ -308,7 +308,7 @@ def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:
     }
 
 
-def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any]:
+def survival(first: FloatArray, watched: FloatArray, deadline: float) -> dict[str, Any]:
     """Probability that an event has happened by a time, from N records of different lengths.
 
     Parameters
@@ -318,7 +318,7 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
         after the end of the record counts as none.
     watched
         Lengths of the records in s, shape (N,).
-    at
+    deadline
         The time in s by which the event has happened or not.
 
     Returns
@@ -345,24 +345,24 @@ def survival(first: FloatArray, watched: FloatArray, at: float) -> dict[str, Any
     from scipy.stats import CensoredData, binomtest, ecdf
 
     censored = first > watched
-    long_enough = watched >= at * (1.0 - _SAME_LENGTH)
+    long_enough = watched >= deadline * (1.0 - _SAME_LENGTH)
     records = CensoredData.right_censored(np.minimum(first, watched), censored)
     share = ecdf(records).cdf
     with warnings.catch_warnings():  # at times at which all have climbed
         warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
         band = share.confidence_interval(CONFIDENCE, method="log-log")
-    climbed = int((~censored & (first <= at)).sum())
+    climbed = int((~censored & (first <= deadline)).sum())
     ended = int((censored & ~long_enough).sum())
     probability = None
     if long_enough.any() or not censored.any():
-        probability = float(share.evaluate(at))
+        probability = float(share.evaluate(deadline))
     estimator = "Clopper-Pearson"
     interval = None
     if ended and probability is not None and 0.0 < probability < 1.0:
         estimator = "Kaplan-Meier"
-        interval = [float(band.low.evaluate(at)), float(band.high.evaluate(at))]
+        interval = [float(band.low.evaluate(deadline)), float(band.high.evaluate(deadline))]
     elif probability is not None:
-        followed = int((long_enough | (first <= np.minimum(watched, at))).sum())
+        followed = int((long_enough | (first <= np.minimum(watched, deadline))).sum())
         exact = binomtest(climbed, followed).proportion_ci(CONFIDENCE)
         interval = [float(exact.low), float(exact.high)]
     times_of_half = share.quantiles[share.probabilities >= 0.5]

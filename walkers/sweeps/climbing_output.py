@@ -40,13 +40,13 @@ class _Subset:
         What the table and the legend call them.
     key
         Their key in the results of `walkers.sweeps.climbing.climb_summary`; empty for all climbs.
-    look
+    marker
         Matplotlib's format: colour and marker.
     """
 
     label: str
     key: str
-    look: str
+    marker: str
 
     def numbers_in(self, condition: Mapping[str, Any]) -> Mapping[str, Any]:
         """The statistics of these climbs in a condition."""
@@ -56,9 +56,9 @@ class _Subset:
         return condition
 
 
-_ALL = _Subset(label="all", key="", look="ko")
-_ON_PLAIN_WALLS = _Subset(label="plain walls", key="on_plain_walls", look="C1s")
-_IN_CORNERS = _Subset(label="corners", key="in_corners", look="C2^")
+_ALL = _Subset(label="all", key="", marker="ko")
+_ON_PLAIN_WALLS = _Subset(label="plain walls", key="on_plain_walls", marker="C1s")
+_IN_CORNERS = _Subset(label="corners", key="in_corners", marker="C2^")
 _SUBSETS = (_ALL, _ON_PLAIN_WALLS, _IN_CORNERS)
 _MISSING = "–"
 """Text of a statistic that does not exist, such as the speed if nothing climbed."""
@@ -226,7 +226,7 @@ def _draw_speeds(axes: Axes, climbs: Sequence[Mapping[str, Any]]) -> None:
         axes.plot(
             sizes,
             speeds,
-            subset.look,
+            subset.marker,
             label=subset.label,
             markerfacecolor="none",
             clip_on=False,
@@ -251,7 +251,7 @@ def _draw_rates(axes: Axes, table: pd.DataFrame) -> None:
             rates,
             places,
             xerr=errors,
-            fmt=subset.look,
+            fmt=subset.marker,
             label=subset.label,
             linestyle="none",
             markersize=3.0,

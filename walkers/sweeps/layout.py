@@ -69,14 +69,14 @@ def figure_layout(
     hue = _chosen("hue", options.hue, factors, rows)
     panels = _chosen("panels", options.panels, factors, rows)
     chosen = _existing(x, hue, panels)
-    left = [factor for factor in factors if not factor.is_among(chosen)]
-    x_factors = [x] if x else _default_x(left, rows)
+    unplaced = [factor for factor in factors if not factor.is_among(chosen)]
+    x_factors = [x] if x else _default_x(unplaced, rows)
     if len(x_factors) > 1 and panels:
         raise input_error("panels", "expected x too: the samples have a panel for each key")
-    left = [factor for factor in left if not (factor in x_factors or _is_seed(factor))]
+    unplaced = [factor for factor in unplaced if not (factor in x_factors or _is_seed(factor))]
     if options.hue is None:
-        hue = _first_not_sampled(left)
-    hidden = _hidden_factors(left, factors, FigureLayout(x_factors, hue, panels))
+        hue = _first_not_sampled(unplaced)
+    hidden = _hidden_factors(unplaced, factors, FigureLayout(x_factors, hue, panels))
     layout = FigureLayout(x_factors, hue, panels, hidden)
     if NO_FACTOR not in (options.hue, options.panels):
         _check_all_shown(layout)
@@ -155,13 +155,13 @@ def _default_x(factors: Sequence[Factor], rows: pd.DataFrame) -> list[Factor]:
 
 
 def _hidden_factors(
-    left: Sequence[Factor], factors: Sequence[Factor], layout: FigureLayout
+    unplaced: Sequence[Factor], factors: Sequence[Factor], layout: FigureLayout
 ) -> list[Factor]:
     """The factors that a figure does not show.
 
     Parameters
     ----------
-    left
+    unplaced
         Factors that have no place in the figure.
     factors
         All factors.
@@ -173,15 +173,15 @@ def _hidden_factors(
         is_on_x = factor.is_among(layout.x_factors)
         if is_on_x and not factor.is_sample:
             shown.append(factor)
-    return [factor for factor in left if not _follows_from(shown, factor)]
+    return [factor for factor in unplaced if not _follows_from(shown, factor)]
 
 
 def _follows_from(shown: Sequence[Factor], factor: Factor) -> bool:
     """Whether points with the same levels of the shown factors have the same level of a factor."""
-    level_by_look: dict[tuple[object, ...], object] = {}
+    level_by_shown: dict[tuple[object, ...], object] = {}
     for number, level in enumerate(factor.values):
-        look = tuple(visible.values[number] for visible in shown)
-        if level_by_look.setdefault(look, level) != level:
+        shown_levels = tuple(visible.values[number] for visible in shown)
+        if level_by_shown.setdefault(shown_levels, level) != level:
             return False
     return True
 

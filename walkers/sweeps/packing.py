@@ -165,10 +165,10 @@ def unfinished_parts(
     finished
         Numbers of the finished points of the sweep.
     """
-    done = set(points).intersection(finished)
-    if not done:
+    finished_points = set(points).intersection(finished)
+    if not finished_points:
         return [PlannedDeck.of_points(points, cases)]
-    if len(done) == len(points):
+    if len(finished_points) == len(points):
         return []
     first, second = parts_of(points, 2)
     return [

@@ -262,6 +262,21 @@ def plan_sweep(
         statuses.append(state.status)
         if state.status == "finished":
             settled.add(point)
+    return SweepPlan(
+        record=record,
+        cases=cases,
+        engine=binary,
+        decks=_missing_decks(cases, settled, options),
+        statuses=statuses,
+        options=options,
+        final=final,
+    )
+
+
+def _missing_decks(
+    cases: Sequence[Case], settled: Collection[int], options: SweepOptions
+) -> list[PlannedDeck]:
+    """The decks of the points that are not settled: neither finished nor failed for good."""
     longest = LONGEST_SECONDS
     if options.time_limit:
         # A shared deck stays well below the time limit, because a single point may be close to it.
@@ -269,15 +284,7 @@ def plan_sweep(
     decks: list[PlannedDeck] = []
     for deck in pack(cases, options.decks_at_once, longest):
         decks += unfinished_parts(deck.points, cases, settled)
-    return SweepPlan(
-        record=record,
-        cases=cases,
-        engine=binary,
-        decks=decks,
-        statuses=statuses,
-        options=options,
-        final=final,
-    )
+    return decks
 
 
 def _ignore(_: Progress) -> None:
