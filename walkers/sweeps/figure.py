@@ -276,7 +276,7 @@ def _draw_panel(
         offset = 0.0
         if not panel.x.is_number:
             offset = category_offset(number, len(colours.styles))
-        series = Series.of_points(panel.x, colours.are_drawn(level, panel.drawn), offset)
+        series = Series.of_points(panel.x, colours.points_of_level(level, panel.drawn), offset)
         draw_series(axes, series, points, style, joined=theory is None)
         if theory is not None:
             draw_theory(axes, series, theory, style["color"])

@@ -20,13 +20,13 @@ from walkers.runner.cost import pairs_of_beads, predicted_seconds
 from walkers.templates.placement import sharing_key
 
 MOST_WALKERS = 96
-"""Limit for a deck; with 96 walkers the cost of the deck itself is 4 % of the total."""
+"""Largest number of walkers of a deck; with 96, the cost of the deck itself is 4 % of the total."""
 MOST_POINTS = 64
-"""Limit for a deck."""
+"""Largest number of points of a deck."""
 LONGEST_SECONDS = 60.0
-"""Limit of the predicted time of a deck of several points, so that results appear regularly."""
+"""Largest predicted time of a deck of several points, s, so that results appear regularly."""
 _TRIALS = 24
-"""Number of plans that are compared; each has decks that are 2^(1/4) times shorter."""
+"""Number of plans that are compared; the decks of each are 2^(1/4) times shorter than before."""
 _AS_GOOD = 1.02
 """Plans that take at most this many times as long as the fastest one are equally good."""
 
@@ -83,8 +83,9 @@ def pack(
         plans.append(decks)
         spans.append(makespan(seconds_of(decks), workers))
     good = [number for number, span in enumerate(spans) if span <= _AS_GOOD * min(spans)]
-    smallest_decks = plans[max(good)]
-    return sorted(smallest_decks, key=lambda deck: -deck.seconds)
+    # Later trials have smaller decks, which are better if they take equally long.
+    chosen = plans[max(good)]
+    return sorted(chosen, key=lambda deck: -deck.seconds)
 
 
 def _sharing_points(cases: Sequence[Case]) -> list[list[int]]:

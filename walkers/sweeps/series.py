@@ -70,8 +70,8 @@ class Colours:
             }
         return cls(factor, styles)
 
-    def are_drawn(self, level: Any, drawn: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-        """Which of the drawn points have the colour of a level."""
+    def points_of_level(self, level: Any, drawn: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+        """Which of the drawn points have the colour of a level, shape (N,)."""
         if self.factor is None:
             return drawn
         return drawn & self.factor.has_level(level)

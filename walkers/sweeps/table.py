@@ -507,7 +507,7 @@ def cells_of(
 
 
 def _printed_columns(frame: pd.DataFrame) -> list[str]:
-    """Names of the columns that may be printed: no further numbers of results, and no messages."""
+    """Names of the columns that may be printed: all keys, and the most important results."""
     printed = set(_SHOWN)
     if sides_differ(frame):
         printed.update(SIDES)
