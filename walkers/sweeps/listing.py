@@ -141,7 +141,7 @@ def _sweeps_text(sweeps: Sequence[ListEntry]) -> str:
     """Sweeps as text, a line each, with the number of values of each varied key."""
     lines = [["sweep", "points", "age", "size", "case", "varies (values)"]]
     for sweep in sweeps:
-        varied = [f"{key} ({number})" for key, number in sweep.parameters.items()]
+        varied = [f"{key} ({count})" for key, count in sweep.parameters.items()]
         status = status_text(sweep.points or {})
         lines.append([sweep.name, status, *sweep.weight, sweep.case, ", ".join(varied)])
     return aligned(lines)

@@ -119,9 +119,12 @@ def states(record: SweepRecord, *, results: bool = False) -> list[PointState]:
         Whether the results of finished runs are read. If they are, a finished run whose result
         cannot be read has failed.
     """
-    points = [state_at(record.out / run) for run in record.runs]
-    if results:
-        return [_with_result(state) for state in points]
+    points = []
+    for run in record.runs:
+        state = state_at(record.out / run)
+        if results:
+            state = _with_result(state)
+        points.append(state)
     return points
 
 

@@ -58,9 +58,14 @@ def removals_in(out: Path, places: Sequence[Path]) -> list[Removal]:
 def _entries_at(place: Path, contents: Sequence[ListEntry]) -> list[ListEntry]:
     """The entry of a directory, or the entries of the run that belongs in a place."""
     resolved = place.resolve()
-    entries = [entry for entry in contents if entry.directory.resolve() == resolved]
-    if not entries:
-        entries = [entry for entry in contents if place_of(entry.directory).resolve() == resolved]
+    in_directory = []
+    of_run = []
+    for entry in contents:
+        if entry.directory.resolve() == resolved:
+            in_directory.append(entry)
+        if place_of(entry.directory).resolve() == resolved:
+            of_run.append(entry)
+    entries = in_directory or of_run
     if not entries:
         raise input_error(place, "no run or sweep in the folder of runs (see walkers list)")
     return entries

@@ -347,7 +347,9 @@ def figures_of_spread(run: Path) -> dict[str, Figure]:
 
 def spread_text(spread: Spread) -> str:
     """A spread in a few lines: mm, mm/s."""
-    points = max((band["points"] for band in spread.bands.values()), default=0)
+    points = 0
+    for band in spread.bands.values():
+        points = max(points, int(band["points"]))
     lines = [
         f"  spread     {points} draws; values drawn independently from their ranges, "
         "half of them at or below the value of the case"

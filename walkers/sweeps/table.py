@@ -222,12 +222,14 @@ def _varied_columns(sweep: SweepDefinition) -> dict[str, tuple[str, str]]:
     columns = {}
     values_by_key = zip(*sweep.values, strict=True)
     for (key, unit), values in zip(sweep.units.items(), values_by_key, strict=True):
-        lengths = [len(value) for value in values if isinstance(value, list)]
-        names = [f"{key}[{part}]" for part in range(max(lengths, default=0))]
-        if len(lengths) < len(values):
-            names.insert(0, key)
-        for name in names:
-            columns[name] = (unit or "", "varied")
+        parts = 0
+        for value in values:
+            if isinstance(value, list):
+                parts = max(parts, len(value))
+            else:
+                columns[key] = (unit or "", "varied")
+        for part in range(parts):
+            columns[f"{key}[{part}]"] = (unit or "", "varied")
     return columns
 
 
