@@ -61,7 +61,7 @@ def write_outcome(outcome: Outcome, to: Path) -> list[Path]:
     values = calibration.values(outcome.posterior.samples)
     samples = pd.DataFrame(values, columns=list(calibration.file.parameters))
     best = best_case(calibration, outcome.sets[PROPOSED[0]], samples)
-    report = rendered("walkers.calibration", "report.md.j2", found=record)
+    report = rendered("walkers.calibration", "report.md.j2", {"found": record})
     posterior_path = to / "posterior.parquet"
     record_path = to / CALIBRATION_NAME
     report_path = to / "calibration.md"

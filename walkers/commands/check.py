@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 from cyclopts import App, Parameter
 from cyclopts.validators import Number
@@ -25,9 +24,6 @@ from walkers.commands.options import (
     tell,
 )
 from walkers.errors import input_error
-
-if TYPE_CHECKING:
-    pass
 
 # An app of its own does not inherit the heading of the options.
 check = App(name="check", version_flags=(), group_parameters="Options")
@@ -57,16 +53,8 @@ def engine(
         except OSError as error:
             warnings.warn(f"the outcome cannot be kept: {error}", stacklevel=1)
     about = {"path": str(binary.path), "sha256": binary.sha256, "version": version}
-    name = f"{version}, binary and contact model {binary.sha256[:12]}: "
-    return _print_checked(lines, as_json, {"engine": about}, name)
-
-
-def _print_checked(
-    lines: Sequence[Line], as_json: bool, about: Mapping[str, Any], heading: str = ""
-) -> int:
-    from walkers.second_engine.lines import as_dict, failures, lines_text
-
-    print_as(as_json, lambda: as_dict(lines, about), lambda: lines_text(lines, heading))
+    heading = f"{version}, binary and contact model {binary.sha256[:12]}: "
+    print_as(as_json, lambda: as_dict(lines, {"engine": about}), lambda: lines_text(lines, heading))
     return 1 if failures(lines) else 0
 
 
@@ -121,12 +109,19 @@ def case(
     )
     for term in terms:
         refuse(f"--without {term}", term not in TERMS, f"expected one of {', '.join(TERMS)}")
-    try:
-        loaded = loaded if cycles is None else with_cycles(loaded, cycles)
-    except ValueError as error:
-        raise input_error("--cycles", str(error)) from error
-    lines = crosscheck(loaded, at.out, without or (), seeds=seeds, progress=True, engine=engine)
-    return _print_checked(lines, as_json, {"case": loaded.name, "without": without or []})
+    if cycles is not None:
+        try:
+            loaded = with_cycles(loaded, cycles)
+        except ValueError as error:
+            raise input_error("--cycles", str(error)) from error
+    lines = crosscheck(loaded, lookup.out, terms, seeds=seeds, progress=True, engine=engine)
+    name = loaded.name
+    print_as(
+        as_json,
+        lambda: as_dict(lines, {"case": name, "without": terms}),
+        lambda: lines_text(lines),
+    )
+    return 1 if failures(lines) else 0
 
 
 def library(name: Annotated[str | None, Parameter(name="NAME")] = None, /) -> None:

@@ -85,7 +85,7 @@ def show(
 
 
 def _show_theory(case: str, lookup: LookupOptions, as_json: bool) -> None:
-    from walkers.theory.prediction import prediction_text
+    from walkers.theory.prediction_text import prediction_text
 
     prediction = walkers.predict(case, lookup.out, lookup.values)
     print_as(

@@ -31,7 +31,13 @@ from walkers.runner.binary import find_engine
 from walkers.runner.compiled_model import plugin_of, write_run_script
 from walkers.runner.failures import EngineFailure, MissingFrames
 from walkers.runner.launch import EngineReport, judge
-from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest, write_manifest
+from walkers.runner.manifest import (
+    MANIFEST_NAME,
+    FinishedRun,
+    checksums,
+    read_manifest,
+    write_manifest,
+)
 from walkers.runs.case_text import quantity_kind
 from walkers.templates import deck as decks
 from walkers.templates.deck import Segment
@@ -108,7 +114,7 @@ def write_folder(case: Case, folder: Path) -> Path:
         If there is no engine (`find_engine`), or the contact model cannot be compiled
         (`plugin_of`).
     """
-    deck = decks.render_deck(case, decks.whole(case))
+    deck = decks.render_deck(case, decks.single_segment(case))
     engine = find_engine()
     plugin = plugin_of(engine)
     try:
@@ -218,8 +224,8 @@ def _make_run_directory(folder: Path, deck: Path, log: Path) -> None:
     if _modified(deck) > _modified(log):
         notes.append(f"{deck.name} is newer than {log.name}: if it was edited since, run it again")
     (folder / MANIFEST_NAME).unlink(missing_ok=True)
-    write_json(folder / run_directory.CASE_NAME, run.case.as_dict(), at_once=False)
-    write_json(folder / decks.LAYOUT_NAME, rendered.layout.as_dict(), at_once=False)
+    write_json(folder / run_directory.CASE_NAME, run.case.as_dict(), sync=False)
+    write_json(folder / decks.LAYOUT_NAME, rendered.layout.as_dict(), sync=False)
     _write_segment_record(folder, run, report, notes)
     advice = _advice_on_length(folder, run)
     if advice:
@@ -228,28 +234,26 @@ def _make_run_directory(folder: Path, deck: Path, log: Path) -> None:
     measure(folder)
     scaled_tables = folder / decks.SCALED_BRIDGES_NAME
     tables = scaled_tables if scaled_tables.is_file() else folder / decks.BRIDGES_NAME
-    write_manifest(
-        run.case,
-        folder.name,
-        None,
-        report,
+    finished = FinishedRun(
+        case=run.case,
+        name=folder.name,
+        engine=None,
+        report=report,
         started=time.time(),
-        directory=folder,
-        drive_from=run.segment.drive_from,
         segments=1,
+        drive_from=run.segment.drive_from or 0,
         by_hand=notes,
         bridge_tables=checksum(tables),
     )
+    write_manifest(folder, finished)
 
 
 def _write_segment_record(
     folder: Path, run: _RunByHand, report: EngineReport, notes: Sequence[str]
 ) -> None:
     """Write the record of the only segment, with what the user should know about the run."""
-    edited = bool(run.edits)
-    run_directory.write_segment_record(
-        folder, run.segment, report, by_hand=notes, deck_edited=edited
-    )
+    by_hand = run_directory.ByHand(notes, deck_edited=bool(run.edits))
+    run_directory.write_segment_record(folder, run.segment, report, by_hand=by_hand)
 
 
 def _advice_on_length(folder: Path, run: _RunByHand) -> str:

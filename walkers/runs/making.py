@@ -448,21 +448,18 @@ class OpenRun:
         for record in self.done:
             if record["end"] <= drive_from:
                 settled = record["root_mean_square_velocity"]
-        ended: dict[str, Any] = {}
-        if self.ended:
-            ended["ended"] = self.ended
-        write_manifest(
-            self.case,
-            self.place.name,
-            self.engine,
-            report,
+        finished = FinishedRun(
+            case=self.case,
+            name=self.place.name,
+            engine=self.engine,
+            report=report,
             started=self.started,
-            directory=self.directory,
             segments=len(self.done),
             drive_from=drive_from,
             settled=settled,
-            **ended,
+            ended=self.ended,
         )
+        write_manifest(self.directory, finished)
         os.sync()
         run_directory.move_into_place(self.directory, self.place)
 
@@ -644,15 +641,14 @@ def _make_together(
             shared_deck = {"first": first, "runs": len(done), "walkers": len(deck.layout.walkers)}
             for name in done:
                 measure(incomplete / name)
-                write_manifest(
-                    cases[name],
-                    name,
-                    options.engine,
-                    report,
+                finished = FinishedRun(
+                    case=cases[name],
+                    name=name,
+                    engine=options.engine,
+                    report=report,
                     started=started,
-                    directory=incomplete / name,
-                    drive_from=0,
                     segments=1,
+                    drive_from=0,
                     shared_deck=shared_deck,
                 )
                 write_manifest(incomplete / name, finished)

@@ -145,7 +145,7 @@ def _write_layout(part: _Part, layout: DeckLayout, renumbering: _Renumbering) ->
         new_ids = renumbering.new_id[list(walker.beads)]
         walkers.append(replace(walker, walker=number, beads=tuple(new_ids.tolist())))
     layout_of_case = replace(layout, atoms=len(part.bead_ids), walkers=tuple(walkers), ranks=1)
-    write_json(part.directory / LAYOUT_NAME, layout_of_case.as_dict(), at_once=False)
+    write_json(part.directory / LAYOUT_NAME, layout_of_case.as_dict(), sync=False)
 
 
 def _split_bridges(

@@ -695,11 +695,13 @@ def stock_lines(bench: Bench) -> Iterator[Line]:
     stock_deck = rendered(
         "walkers.second_engine",
         "stock.lig.j2",
-        case=case,
-        scene=scene,
-        layout=deck.layout,
-        angle=degrees(sqrt(2.0 * case.liquid.contact_angle)),
-        closest=surfaces.roughness / surfaces.reduced_radius,
+        {
+            "case": case,
+            "scene": scene,
+            "layout": deck.layout,
+            "angle": degrees(sqrt(2.0 * case.liquid.contact_angle)),
+            "closest": surfaces.roughness / surfaces.reduced_radius,
+        },
     )
     with_stock_model = bench.run(replace(deck, text=stock_deck))
     error = relative_error(with_contact_model.forces[..., :3], with_stock_model.forces[..., :3])

@@ -143,7 +143,7 @@ def _sweeps_text(sweeps: Sequence[ListEntry]) -> str:
     for sweep in sweeps:
         varied = [f"{key} ({count})" for key, count in sweep.parameters.items()]
         status = status_text(sweep.points or {})
-        lines.append([sweep.name, status, *sweep.weight, sweep.case, ", ".join(varied)])
+        lines.append([sweep.name, status, *sweep.age_and_size, sweep.case, ", ".join(varied)])
     return aligned(lines)
 
 

@@ -31,7 +31,7 @@ from walkers.runner.audit import check_audit
 from walkers.runner.binary import Engine, find_engine
 from walkers.runner.cost import PROGRAM_SECONDS, predicted_overhead, predicted_seconds
 from walkers.runner.failures import OutputGone
-from walkers.runner.launch import cores_here
+from walkers.runner.process import cores_here
 from walkers.runner.run_directory import is_finished, is_locked, run_place
 from walkers.runs.making import progress_at
 from walkers.runs.status import PointState, status_text

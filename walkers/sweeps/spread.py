@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.errors import InputError, check_limits, input_error, key_error
 from walkers.files import write_json
-from walkers.inputs.axes import ranges_of, unit_cube, written
+from walkers.inputs.axes import ranges_of, unit_cube, value_in_unit
 from walkers.inputs.messages import attributed_to
 from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import SweepDefinition, expand

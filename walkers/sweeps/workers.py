@@ -166,7 +166,7 @@ def _failure_of_deck(error: OSError | WalkersError, task: DeckTask) -> Failure:
         reason=kind.__name__,
         message=message,
         directory=directory,
-        hits=getattr(kind, "hits", ""),
+        hits=getattr(kind, "affects", ""),
         cause=cause,
     )
 

@@ -112,7 +112,9 @@ def integrate(  # noqa: PLR0913, PLR0917
     series = np.zeros((count, steps, 3))
     work = np.zeros((8, 3))
     first_later_cycle = cycles // 2
-    whole_step = np.int64(0)  # for a literal 0, numba compiles a version that its cache cannot load
+    whole_step = int(
+        np.int64(0)
+    )  # for a literal 0, numba compiles a version that its cache cannot load
     for walker in range(count):
         state = np.zeros((4, 3))
         totals = np.full((2, 3), np.inf)  # mean sliding velocities, smallest normal forces

@@ -195,7 +195,10 @@ def _check_length(case: Setup, run: RunSettings, longest: float) -> None:
         run.settling_cycles,
         run.cycles_per_sample,
     )
-    (fewest, most), name = drive.cycle_limits, "run.cycles" if run.duration is None else "run.duration"
+    (fewest, most), name = (
+        drive.cycle_limits,
+        "run.cycles" if run.duration is None else "run.duration",
+    )
     if run.until and case.mixture is None:
         raise key_error(
             "run.until", "expected none: only clusters of a [mixture] climb out of a pile"
