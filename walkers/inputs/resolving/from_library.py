@@ -1,16 +1,21 @@
-"""Values of the library and defaults, filled in before the document of a case is validated."""
+"""Values of the library and defaults, filled in before the document of a case is validated.
+
+A case names materials and a liquid. What it leaves out about them is taken here from the library
+(`walkers.inputs.resolving.library`). Values that follow from other values of the case are the
+subject of `walkers.inputs.resolving.steps`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
-from walkers.errors import Problem, expected_of, quoted
+from walkers.errors import InputError, Problem, expected_of, key_error, quoted
 from walkers.inputs.config_table import alternatives, changed
 from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.origins import Source
-from walkers.inputs.resolving.library import Library, LibraryNumber, unmeasured
+from walkers.inputs.resolving.library import Composition, Library, LibraryNumber, unmeasured
 from walkers.inputs.tables.case import CaseFile
 from walkers.inputs.units import TEMPERATURE, parse_quantity
 from walkers.physics.capillary import DEFAULT_LAW
@@ -18,127 +23,213 @@ from walkers.physics.mixtures import MIXTURES
 
 NAMES = ("beads.material", "boundary.material", "liquid.name")
 """Keys whose values are names of the library."""
-_FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall", "contact.rolling_friction")
-_OF_SURFACES = (
-    *("liquid.meniscus_radius", "liquid.volume_fraction", "liquid.contact_angle"),
-    *("contact.rolling_friction", "contact.restitution"),
+OF_LIQUIDS = (
+    "liquid.surface_tension",
+    "liquid.density",
+    "liquid.kinematic_viscosity",
+    "liquid.dynamic_viscosity",
 )
+"""Keys of a case that the library gives for a liquid."""
 ROUGHNESS = ("contact.roughness.bead_bead", "contact.roughness.bead_wall")
-_VISCOSITIES = ("liquid.kinematic_viscosity", "liquid.dynamic_viscosity")
-OF_LIQUIDS = ("liquid.surface_tension", "liquid.density", *_VISCOSITIES)
-_LIQUIDS = ((OF_LIQUIDS[0], _VISCOSITIES[1]), OF_LIQUIDS[:3])
-"""Keys that describe a liquid completely: surface tension, and dynamic viscosity or density and kinematic viscosity."""
-SUPPLIED = ("beads.density", *OF_LIQUIDS, *_FRICTION[:2], *ROUGHNESS, *_OF_SURFACES)
+"""Keys of the roughness of contacts, which follows from the materials of both surfaces."""
+_FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall")
+"""Keys of sliding friction, which a surface pair gives."""
+_OF_SURFACES = (
+    "liquid.meniscus_radius",
+    "liquid.volume_fraction",
+    "liquid.contact_angle",
+    "contact.rolling_friction",
+    "contact.restitution",
+)
+"""Other keys that the surface pair of beads and boundary gives; its entries have their last
+words."""
+SUPPLIED = ("beads.density", *OF_LIQUIDS, *_FRICTION, *ROUGHNESS, *_OF_SURFACES)
 """Keys that a case may leave out because the library has values or defaults."""
+_DESCRIBING_SURFACES = (*_FRICTION, "contact.rolling_friction")
+"""Keys that describe surfaces completely."""
+_DESCRIBING_LIQUID = (
+    ("liquid.surface_tension", "liquid.dynamic_viscosity"),
+    ("liquid.surface_tension", "liquid.density", "liquid.kinematic_viscosity"),
+)
+"""Groups of keys each of which describes a liquid completely."""
+_MASS_FRACTION = "liquid.mass_fraction"
+_TEMPERATURE = "liquid.temperature"
+_DEFAULT_TEMPERATURE = "20 degC"
+"""Temperature of a liquid that is a mixture, if the case gives none."""
 
 
 def supplied(
     document: Mapping[str, Any], library: Library
 ) -> tuple[dict[str, Any], dict[str, Source], list[Problem]]:
-    """The tables of a case with missing values from the library, their sources, and names that it does not know."""
+    """Fill in the values that a case leaves out and the library has.
+
+    Parameters
+    ----------
+    document
+        The tables of a case as they were written.
+    library
+        The library for the case.
+
+    Returns
+    -------
+    tables : dict
+        The tables with the missing values, without the library and the contents of meshes.
+    sources : dict of str to Source
+        Sources of the values that were filled in, by their keys.
+    problems : list of Problem
+        Names that the library does not know, and wrong compositions of the liquid.
+    """
+    names = {key: _name_at(document, key) for key in NAMES}
     given = {key for key in SUPPLIED if value_at(document, parts_of(key)) is not MISSING}
-    named = (value_at(document, parts_of(key)) for key in NAMES)
-    bead, wall, liquid = (name if isinstance(name, str) else None for name in named)
-    problems = _unknown(library, given, (bead, wall, liquid))
-    mixture, sources, problem = _mixture(document, liquid)
-    problems += problem
-    values = _values(library, bead, wall, None if problem else liquid, mixture)
+    problems = _unknown_names(library, given, names)
+    liquid = names["liquid.name"]
+    known_liquid = liquid
+    composition = None
+    try:
+        composition = _composition(document, liquid)
+    except InputError as error:
+        problems += error.problems
+        known_liquid = None
+    values = _values(
+        library, names["beads.material"], names["boundary.material"], known_liquid, composition
+    )
     # Calibrations used one law of the bridges: with another law their numbers are guesses.
-    calibrated = liquid if value_at(document, ("liquid", "law")) in (MISSING, DEFAULT_LAW) else None
+    law = value_at(document, ("liquid", "law"))
+    calibrated = liquid if law in (MISSING, DEFAULT_LAW) else None
     tables = {name: value for name, value in document.items() if name not in ("library", "meshes")}
     tables.setdefault("contact", {})
+    sources: dict[str, Source] = {}
+    if composition and value_at(document, parts_of(_TEMPERATURE)) is MISSING:
+        sources[_TEMPERATURE] = Source("default", text=_DEFAULT_TEMPERATURE)
     written: dict[str, Any] = {}
     for key in SUPPLIED:
-        replaced = {key, *alternatives(CaseFile, key)} & {*given, *written}
-        if key in values and not replaced and isinstance(tables.get(key.split(".")[0]), Mapping):
-            written[key], sources[key] = (
-                values[key].written,
-                _source_of(key, values[key], calibrated),
-            )
+        has_table = isinstance(tables.get(key.split(".")[0]), Mapping)
+        equivalent = {key, *alternatives(CaseFile, key)}
+        if key not in values or not has_table or equivalent & {*given, *written}:
+            continue
+        written[key] = values[key].written
+        sources[key] = _source_of(key, values[key], calibrated)
     return changed(CaseFile, tables, written), sources, problems
 
 
-def _unknown(library: Library, given: set[str], names: Sequence[str | None]) -> list[Problem]:
-    """Names that are not in the library and that the case does not describe completely itself."""
-    described, problems = given.issuperset(_FRICTION), []
-    complete = (
-        described and "beads.density" in given,
-        described,
-        any(given.issuperset(keys) for keys in _LIQUIDS),
-    )
-    for key, name, says_all in zip(NAMES, names, complete, strict=True):
-        kind = "liquids" if key == "liquid.name" else "materials"
-        if name is not None and not says_all and name not in library.names(kind):
-            expected = (
-                f"nor in a library.toml beside the case; {expected_of(name, library.names(kind))}"
-            )
-            problems.append(Problem(key, quoted(name), f"not in the library, {expected}"))
+def _name_at(document: Mapping[str, Any], key: str) -> str | None:
+    """The name at a key of a case; None if there is none, or no text."""
+    name = value_at(document, parts_of(key))
+    return name if isinstance(name, str) else None
+
+
+def _unknown_names(
+    library: Library, given: set[str], names: Mapping[str, str | None]
+) -> list[Problem]:
+    """Names that are not in the library, of what the case does not describe completely itself.
+
+    ``given`` has the keys that the case gives, ``names`` the names at the keys `NAMES`.
+    """
+    surfaces_described = given.issuperset(_DESCRIBING_SURFACES)
+    described = {
+        "beads.material": surfaces_described and "beads.density" in given,
+        "boundary.material": surfaces_described,
+        "liquid.name": any(given.issuperset(keys) for keys in _DESCRIBING_LIQUID),
+    }
+    problems = []
+    for key, name in names.items():
+        known = library.names("liquids" if key == "liquid.name" else "materials")
+        if name is None or described[key] or name in known:
+            continue
+        expected = f"nor in a library.toml beside the case; {expected_of(name, known)}"
+        problems.append(Problem(key, quoted(name), f"not in the library, {expected}"))
     return problems
 
 
-def _mixture(
-    document: Mapping[str, Any], liquid: str | None
-) -> tuple[tuple[float, float] | None, dict[str, Source], list[Problem]]:
-    """Mass fraction and temperature (K) of a liquid whose numbers depend on them, with sources, or problems."""
-    keys = ("liquid.mass_fraction", "liquid.temperature")
-    share, temperature = (value_at(document, parts_of(key)) for key in keys)
+def _composition(document: Mapping[str, Any], liquid: str | None) -> Composition | None:
+    """The composition of a liquid whose numbers depend on it; None for other liquids.
+
+    Raises
+    ------
+    InputError
+        If the mass fraction is missing or none, if the temperature is none, or if another liquid
+        has one of them.
+    """
+    share = value_at(document, parts_of(_MASS_FRACTION))
+    temperature = value_at(document, parts_of(_TEMPERATURE))
     if liquid not in MIXTURES:
-        extra = [
-            key
-            for key, value in zip(keys, (share, temperature), strict=True)
-            if value is not MISSING
-        ]
-        message = f'expected none: it is for name = "{next(iter(MIXTURES))}"'
-        return None, {}, [Problem(key, None, message) for key in extra]
+        _check_no_composition({_MASS_FRACTION: share, _TEMPERATURE: temperature})
+        return None
     if type(share) not in (int, float) or not 0 <= share <= 1:
         missing = "missing; " if share is MISSING else ""
-        message = (
-            f"{missing}expected the mass of the glycerol over that of the mixture, such as 0.87"
-        )
-        return None, {}, [Problem(keys[0], None, message)]
-    text = "20 degC" if temperature is MISSING else str(temperature)
-    sources = {keys[1]: Source("default", text=text)} if temperature is MISSING else {}
+        expected = "the mass of the glycerol over that of the mixture, such as 0.87"
+        raise key_error(_MASS_FRACTION, f"{missing}expected {expected}")
+    text = _DEFAULT_TEMPERATURE if temperature is MISSING else str(temperature)
     try:
-        return (float(share), parse_quantity(text, TEMPERATURE)), sources, []
+        return Composition(float(share), parse_quantity(text, TEMPERATURE))
     except ValueError as error:
-        return None, {}, [Problem(keys[1], None, str(error))]
+        raise key_error(_TEMPERATURE, str(error)) from error
+
+
+def _check_no_composition(values: Mapping[str, Any]) -> None:
+    """Refuse values, by their keys, that a liquid which is no mixture must not have."""
+    message = f'expected none: it is for name = "{next(iter(MIXTURES))}"'
+    superfluous = [key for key, value in values.items() if value is not MISSING]
+    if superfluous:
+        raise InputError("", [Problem(key, None, message) for key in superfluous])
 
 
 @lru_cache(maxsize=1024)
 def _values(
     library: Library,
-    bead: str | None,
-    wall: str | None,
+    bead_material: str | None,
+    boundary_material: str | None,
     liquid: str | None,
-    mixture: tuple[float, float] | None,
+    composition: Composition | None,
 ) -> dict[str, LibraryNumber]:
     """Defaults, and numbers of the library for materials and a liquid, by the keys of a case."""
-    on_bead, on_wall = library.surface_pair(bead, bead), library.surface_pair(bead, wall)
-    of_liquid = library.numbers("liquids", liquid or "", mixture)
-    values = {
-        "beads.density": library.numbers("materials", bead or "").get("density"),
-        "contact.friction.bead_bead": on_bead.get("friction"),
-        "contact.friction.bead_wall": on_wall.get("friction"),
-        **{
-            key: library.roughness(bead, material)
-            for key, material in zip(ROUGHNESS, (bead, wall), strict=True)
-        },
-        **{key: on_wall.get(key.split(".")[1]) for key in _OF_SURFACES},
-        **{f"liquid.{key}": number for key, number in of_liquid.items()},
+    between_beads = library.surface_pair(bead_material, bead_material)
+    at_boundary = library.surface_pair(bead_material, boundary_material)
+    numbers: dict[str, LibraryNumber | None] = {
+        "beads.density": library.numbers("materials", bead_material or "").get("density"),
+        "contact.friction.bead_bead": between_beads.get("friction"),
+        "contact.friction.bead_wall": at_boundary.get("friction"),
+        "contact.roughness.bead_bead": library.roughness(bead_material, bead_material),
+        "contact.roughness.bead_wall": library.roughness(bead_material, boundary_material),
     }
-    # Of the two that give the liquid, the library's own is taken; without one it is a volume.
-    usual = {key: number for key, number in unmeasured().items() if key != "liquid.meniscus_radius"}
-    return usual | {key: number for key, number in values.items() if number}
+    for key in _OF_SURFACES:
+        numbers[key] = at_boundary.get(key.split(".")[1])
+    for name, number in library.numbers("liquids", liquid or "", composition).items():
+        numbers[f"liquid.{name}"] = number
+    values = dict(unmeasured())
+    # The amount of liquid is a volume or a meniscus. Only a surface pair of the library gives a
+    # meniscus; the default is a volume.
+    values.pop("liquid.meniscus_radius", None)
+    return values | {key: number for key, number in numbers.items() if number is not None}
 
 
-def _source_of(key: str, entry: LibraryNumber, liquid: str | None) -> Source:
-    """The source of a number of the library; a number that was calibrated with other liquids is a guess."""
-    usual, text = unmeasured().get(key), str(entry.written)
-    logarithmic = usual is not None and usual.logarithmic
-    if usual is None or (entry.source and not entry.calibrated_with):
-        return Source(entry.origin, entry.source, text, entry.range, logarithmic)
-    if liquid in entry.calibrated_with:
-        return Source(
-            "calibrated" if entry.range else "assumed", entry.source, text, entry.range, logarithmic
-        )
-    return Source("default", entry.source, text, usual.range, logarithmic)
+def _source_of(key: str, number: LibraryNumber, liquid: str | None) -> Source:
+    """The source of a number of the library that a case takes.
+
+    Parameters
+    ----------
+    key
+        Key of the case.
+    number
+        The number.
+    liquid
+        The liquid of the case, with which numbers may be calibrated; None if they are not for the
+        law of the case. A number that was calibrated with other liquids is a guess.
+    """
+    default = unmeasured().get(key)
+    measured = bool(number.source) and not number.calibrated_with
+    ends = number.range
+    if default is None or measured:
+        origin = number.origin
+    elif liquid in number.calibrated_with:
+        origin = "calibrated" if number.range else "assumed"
+    else:
+        origin = "default"
+        ends = default.range
+    return Source(
+        origin=origin,
+        why=number.source,
+        text=str(number.written),
+        range=ends,
+        logarithmic=default is not None and default.logarithmic,
+    )

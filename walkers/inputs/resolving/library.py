@@ -1,10 +1,15 @@
-"""The library of materials, liquids and surface pairs (``library.toml``), each number with its source."""
+"""The library of materials, liquids and surface pairs, each number with its source.
+
+A case names materials and liquids; this module gives their numbers, from the file
+``library.toml`` of the program and from the user's own library. Which of them a case takes is
+decided in `walkers.inputs.resolving.from_library`.
+"""
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from math import sqrt
@@ -26,29 +31,70 @@ from walkers.inputs.units import (
 from walkers.physics.mixtures import MIXTURES
 
 FILE_NAME = "library.toml"
-HALF = (0.5, 293.15)
-_OF_MIXTURES = {
+"""Name of the file of a user's own library, beside the case."""
+_KINDS_OF_PROPERTIES = {
     "density": DENSITY,
     "surface_tension": SURFACE_TENSION,
     "dynamic_viscosity": DYNAMIC_VISCOSITY,
 }
+"""Kinds of quantity of the properties that are computed for mixtures of liquids."""
+_IN_PROGRAM = "is in the library of the program; expected "
+"""Start of a message about an entry that a user's own library must not repeat."""
 
 
-class LibraryNumber(NamedTuple):
-    """A number as a case would write it; the ``range`` of a calibrated one has 5 to 95 % of the posterior."""
+class Composition(NamedTuple):
+    """Mass fraction of the solute, and temperature (K), of a liquid that is a mixture."""
+
+    mass_fraction: float
+    temperature: float
+
+
+HALF = Composition(mass_fraction=0.5, temperature=293.15)
+"""Equal masses at 20 °C: the composition for which a mixture is listed if no other is given."""
+
+
+@dataclass(frozen=True)
+class LibraryNumber:
+    """A number of the library.
+
+    Attributes
+    ----------
+    written
+        The number as a case would write it, such as ``"4.0 g/cm3"``.
+    source
+        Where it is from; empty if it has no source.
+    range
+        Both ends between which it can lie, written as the number; 5 to 95 % of the posterior if
+        it is calibrated. None if it is not uncertain.
+    calibrated_with
+        Names of the liquids of the experiments with which it was calibrated; empty if it was not.
+    origin
+        The library that it is from.
+    logarithmic
+        Whether draws from the range are uniform in the logarithm.
+    """
 
     written: Any
     source: str = ""
     range: tuple[Any, Any] | None = None
-    calibrated_with: tuple[
-        str, ...
-    ] = ()  # names of the liquids of the experiments; empty: not calibrated
+    calibrated_with: tuple[str, ...] = ()
     origin: SourceKind = "library"
     logarithmic: bool = False
 
 
-class Collection(NamedTuple):
-    """Tables of materials, liquids and surface pairs, and the file that they are from."""
+@dataclass(frozen=True)
+class Collection:
+    """Tables of materials, liquids and surface pairs from one file.
+
+    Attributes
+    ----------
+    origin
+        ``library`` for the tables of the program, or ``own library``.
+    place
+        Path of the file; empty for the tables of the program.
+    tables
+        The tables ``materials``, ``liquids`` and ``surface_pairs``.
+    """
 
     origin: SourceKind
     place: str
@@ -56,90 +102,176 @@ class Collection(NamedTuple):
 
 
 class Library:
-    """The materials, liquids and surface pairs that a case can name: of the user's own library, and of the program."""
+    """The materials, liquids and surface pairs that a case can name.
 
-    def __init__(self, users: Mapping[str, Any] | None = None) -> None:
-        own_library = [Collection("own library", users.get("file", ""), users)] if users else []
-        self.collections = [*own_library, Collection("library", "", _contents())]
+    Parameters
+    ----------
+    own_tables
+        The tables of the user's own library, and its path at the key ``file``; they come before
+        those of the program. None or empty for the library of the program alone.
+    """
+
+    def __init__(self, own_tables: Mapping[str, Any] | None = None) -> None:
+        self.collections: list[Collection] = []
+        if own_tables:
+            own = Collection("own library", own_tables.get("file", ""), own_tables)
+            self.collections.append(own)
+        self.collections.append(Collection("library", "", _tables_of_program()))
 
     def names(self, kind: str) -> tuple[str, ...]:
-        """Names of the ``materials`` or of the ``liquids``."""
-        return tuple(
-            dict.fromkeys(
-                name for collection in self.collections for name in collection.tables.get(kind, ())
-            )
-        )
+        """Names of the ``materials`` or of the ``liquids``, each once."""
+        names: dict[str, None] = {}
+        for collection in self.collections:
+            names.update(dict.fromkeys(collection.tables.get(kind, ())))
+        return tuple(names)
 
     def numbers(
-        self, kind: str, name: str, mixture: tuple[float, float] | None = None
+        self, kind: str, name: str, composition: Composition | None = None
     ) -> Mapping[str, LibraryNumber]:
-        """Numbers of a material or liquid; ``mixture``: mass fraction and temperature (K), if they depend on them."""
+        """The numbers of a material or liquid by their keys.
+
+        Parameters
+        ----------
+        kind
+            ``materials`` or ``liquids``.
+        name
+            Name of the material or liquid.
+        composition
+            Composition of a liquid whose numbers depend on it; `HALF` if None. Other liquids and
+            materials ignore it.
+
+        Returns
+        -------
+        mapping of str to LibraryNumber
+            Empty if the library does not know the name.
+        """
         for collection in self.collections:
-            if numbers := collection.tables.get(kind, {}).get(name):
-                computed = MIXTURES[name](*mixture or HALF) if name in MIXTURES else {}
-                texts = {
-                    key: quantity_text(float(f"{computed[key]:.4g}"), _OF_MIXTURES[key])
-                    for key in computed
-                }
-                return {
-                    key: _number({"value": texts.get(key), **entry}, collection)
-                    for key, entry in numbers.items()
-                }
+            entries = collection.tables.get(kind, {}).get(name)
+            if not entries:
+                continue
+            computed = _properties_of_mixture(name, composition or HALF)
+            numbers = {}
+            for key, entry in entries.items():
+                # A value that is written in the file comes before a computed one.
+                numbers[key] = _number({"value": computed.get(key), **entry}, collection)
+            return numbers
         return {}
 
     def surface_pair(self, first: str | None, second: str | None) -> Mapping[str, LibraryNumber]:
-        """Contact parameters of two wet surfaces (``friction``, ``contact_angle``, …); empty if there are none."""
+        """Contact parameters of wet surfaces of two materials, in either order.
+
+        Returns
+        -------
+        mapping of str to LibraryNumber
+            ``friction``, ``contact_angle``, …; empty if the library does not know the pair.
+        """
+        materials = sorted([first or "", second or ""])
         for collection in self.collections:
             for pair in collection.tables.get("surface_pairs", ()):
-                if sorted(pair["materials"]) == sorted([first or "", second or ""]):
-                    liquids = tuple(pair.get("calibrated_with", ()))
-                    numbers = {
-                        key: entry for key, entry in pair.items() if isinstance(entry, Mapping)
-                    }
-                    return {
-                        key: _number(entry, collection, liquids) for key, entry in numbers.items()
-                    }
+                if sorted(pair["materials"]) == materials:
+                    return _numbers_of_pair(pair, collection)
         return {}
 
     def roughness(self, first: str | None, second: str | None) -> LibraryNumber | None:
-        """Roughness of the contact of two materials, the root of the sum of both squares; None if one is unknown."""
-        materials = [
-            (name, self.numbers("materials", name or "").get("roughness"))
-            for name in (first, second)
-        ]
-        entries = [(name, entry) for name, entry in materials if entry is not None]
-        if len(entries) < 2:
+        """Roughness of the contact of two materials: the root of the sum of both squares.
+
+        Returns
+        -------
+        LibraryNumber or None
+            In nanometres, to three digits, with the range between the roots for both lower and
+            both upper ends. None if the roughness of a material is unknown.
+        """
+        first_number = self.numbers("materials", first or "").get("roughness")
+        second_number = self.numbers("materials", second or "").get("roughness")
+        if first_number is None or second_number is None:
             return None
-        parts = zip(
-            *((entry.written, *(entry.range or (entry.written,) * 2)) for _, entry in entries),
-            strict=True,
+        first_ends = first_number.range or (first_number.written, first_number.written)
+        second_ends = second_number.range or (second_number.written, second_number.written)
+        lowest = _root_of_squares(first_ends[0], second_ends[0])
+        highest = _root_of_squares(first_ends[1], second_ends[1])
+        sources = dict.fromkeys(
+            [f"{first}: {first_number.source}", f"{second}: {second_number.source}"]
         )
-        squares = [sum(parse_quantity(text, LENGTH) ** 2 for text in pair) for pair in parts]
-        value, *ends = (f"{float(f'{1e9 * sqrt(square):.3g}'):g} nm" for square in squares)
-        sources = dict.fromkeys(f"{name}: {entry.source}" for name, entry in entries)
-        number = max((entry for _, entry in entries), key=lambda entry: entry.origin != "library")
-        return number._replace(written=value, range=(ends[0], ends[1]), source="; ".join(sources))
+        # The contact is from the user's own library if one of its materials is.
+        template = first_number
+        if first_number.origin == "library" and second_number.origin != "library":
+            template = second_number
+        return replace(
+            template,
+            written=_root_of_squares(first_number.written, second_number.written),
+            range=(lowest, highest),
+            source="; ".join(sources),
+        )
+
+
+def _properties_of_mixture(name: str, composition: Composition) -> dict[str, str]:
+    """Properties of a liquid that is a mixture, to four digits as a case writes them, else none."""
+    if name not in MIXTURES:
+        return {}
+    texts = {}
+    for key, value in MIXTURES[name](*composition).items():
+        texts[key] = quantity_text(float(f"{value:.4g}"), _KINDS_OF_PROPERTIES[key])
+    return texts
+
+
+def _numbers_of_pair(pair: Mapping[str, Any], collection: Collection) -> dict[str, LibraryNumber]:
+    """The numbers of the table of a surface pair, by their keys."""
+    liquids = tuple(pair.get("calibrated_with", ()))
+    numbers = {}
+    for key, entry in pair.items():
+        if isinstance(entry, Mapping):  # not the names of the materials and liquids
+            numbers[key] = _number(entry, collection, liquids)
+    return numbers
+
+
+def _root_of_squares(first: str, second: str) -> str:
+    """The root of the sum of the squares of two lengths, in nanometres with three digits."""
+    square = parse_quantity(first, LENGTH) ** 2 + parse_quantity(second, LENGTH) ** 2
+    rounded = float(f"{1e9 * sqrt(square):.3g}")
+    return f"{rounded:g} nm"
 
 
 @cache
-def _contents() -> dict[str, Any]:
-    return tomllib.loads(
-        resources.files("walkers.inputs").joinpath("library.toml").read_text("utf-8")
-    )
+def _tables_of_program() -> dict[str, Any]:
+    """The tables of the library of the program."""
+    file = resources.files("walkers.inputs").joinpath("library.toml")
+    return tomllib.loads(file.read_text("utf-8"))
 
 
 def _number(
-    table: Mapping[str, Any], of: Collection, liquids: tuple[str, ...] = ()
+    entry: Mapping[str, Any], collection: Collection, liquids: tuple[str, ...] = ()
 ) -> LibraryNumber:
-    source = table.get("source", f"calibrated with {' and '.join(liquids)}" if liquids else "")
-    place, ends = ", ".join(filter(None, (of.place, source))), table.get("range")
+    """The number of an entry such as ``{ value = …, source = "…" }``; ``liquids`` calibrated it."""
+    source = entry.get("source")
+    if source is None:
+        source = f"calibrated with {' and '.join(liquids)}" if liquids else ""
+    ends = entry.get("range")
     return LibraryNumber(
-        table["value"], place, ends and tuple(ends), liquids, of.origin, table.get("log", False)
+        written=entry["value"],
+        source=", ".join(text for text in (collection.place, source) if text),
+        range=tuple(ends) if ends else None,
+        calibrated_with=liquids,
+        origin=collection.origin,
+        logarithmic=entry.get("log", False),
     )
 
 
 def check_library(tables: object, source: str) -> None:
-    """Check a library: raises `InputError` with ``source`` and the keys at fault."""
+    """Check the tables of a user's own library.
+
+    Parameters
+    ----------
+    tables
+        What the file or the case says.
+    source
+        Name of the file, for messages.
+
+    Raises
+    ------
+    InputError
+        With all keys at fault: names or pairs that the library of the program has, pairs that are
+        given twice, and pairs of unknown materials.
+    """
     from walkers.inputs.resolving.library_file import LibraryFile
 
     if not isinstance(tables, Mapping):
@@ -147,59 +279,91 @@ def check_library(tables: object, source: str) -> None:
             source, "expected the tables of a library: materials, liquids, surface_pairs"
         )
     validated(LibraryFile, tables, source, "a library")
-    shipped, text = _contents(), "is in the library of the program; expected "
-    kinds = ("materials", "liquids")
-    again = [
-        f"{kind}.{name}" for kind in kinds for name in tables.get(kind, ()) if name in shipped[kind]
-    ]
-    problems = [Problem(key, None, f"{text}another name") for key in again]
-    materials = Library(tables).names("materials")
-    pairs = [sorted(pair["materials"]) for pair in shipped["surface_pairs"]]
-    given = list(pairs)
-    for number, names in enumerate(pair["materials"] for pair in tables.get("surface_pairs", ())):
-        key, pair = f"surface_pairs[{number}]", sorted(names)
-        if pair in given:
-            why = (
-                f"{text}its numbers in the case instead"
-                if pair in pairs
-                else "is given twice; expected one table"
-            )
-            problems.append(Problem(key, " on ".join(names), why))
-        given.append(pair)
-        for name in sorted({*names}.difference(materials)):
-            why = f"not in the library; {expected_of(name, materials)}"
-            problems.append(Problem(f"{key}.materials", quoted(name), why))
+    problems = [*_repeated_names(tables), *_problems_of_pairs(tables)]
     if problems:
         raise InputError(source, problems)
 
 
+def _repeated_names(tables: Mapping[str, Any]) -> Iterator[Problem]:
+    """Problems of materials and liquids that the library of the program has."""
+    for kind in ("materials", "liquids"):
+        for name in tables.get(kind, ()):
+            if name in _tables_of_program()[kind]:
+                yield Problem(f"{kind}.{name}", None, f"{_IN_PROGRAM}another name")
+
+
+def _problems_of_pairs(tables: Mapping[str, Any]) -> Iterator[Problem]:
+    """Problems of surface pairs: given before, or of materials that no library has."""
+    materials = Library(tables).names("materials")
+    pairs_of_program = [sorted(pair["materials"]) for pair in _tables_of_program()["surface_pairs"]]
+    earlier_pairs = list(pairs_of_program)
+    for number, table in enumerate(tables.get("surface_pairs", ())):
+        key = f"surface_pairs[{number}]"
+        pair = sorted(table["materials"])
+        words = " on ".join(table["materials"])
+        if pair in pairs_of_program:
+            yield Problem(key, words, f"{_IN_PROGRAM}its numbers in the case instead")
+        elif pair in earlier_pairs:
+            yield Problem(key, words, "is given twice; expected one table")
+        earlier_pairs.append(pair)
+        yield from _unknown_materials(f"{key}.materials", pair, materials)
+
+
+def _unknown_materials(
+    key: str, pair: Sequence[str], materials: Sequence[str]
+) -> Iterator[Problem]:
+    """Problems of materials of a pair that are not in the library, in alphabetical order."""
+    for name in sorted(set(pair).difference(materials)):
+        yield Problem(key, quoted(name), f"not in the library; {expected_of(name, materials)}")
+
+
 def library_of(document: Mapping[str, Any], source: str = "") -> Library:
-    """The library for a case, by its tables; raises `InputError` if its own is none."""
-    users = document.get("library")
-    if users is None:
-        return _shipped()
-    # `read_library` puts the name of its file beside its tables.
-    tables = (
-        {name: table for name, table in users.items() if name != "file"}
-        if isinstance(users, Mapping)
-        else users
-    )
+    """The library for a case.
+
+    Parameters
+    ----------
+    document
+        The tables of the case; the user's own library is at the key ``library``.
+    source
+        Name of the case file, for messages.
+
+    Raises
+    ------
+    InputError
+        If the tables at ``library`` are not those of a library.
+    """
+    own_tables = document.get("library")
+    if own_tables is None:
+        return _library_of_program()
+    tables = own_tables
+    if isinstance(own_tables, Mapping):
+        # `read_library` puts the name of the file beside the tables.
+        tables = {name: table for name, table in own_tables.items() if name != "file"}
     try:
         check_library(tables, source)
     except InputError as error:
         problems = [replace(problem, key=f"library.{problem.key}") for problem in error.problems]
         raise InputError(source, problems) from error
-    return Library(users)
+    return Library(own_tables)
 
 
 @cache
-def _shipped() -> Library:
+def _library_of_program() -> Library:
+    """The library of the program alone; one object, so that what is computed of it is cached."""
     return Library()
 
 
 def read_library(folder: Path) -> dict[str, Any]:
-    """The user's own library in a folder; empty if there is none."""
-    if not (path := folder / FILE_NAME).is_file():
+    """The tables of the user's own library in a folder, with its path at ``file``; empty if there
+    is none.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is not a library.
+    """
+    path = folder / FILE_NAME
+    if not path.is_file():
         return {}
     tables = read_toml(path)
     check_library(tables, str(path))
@@ -210,4 +374,5 @@ def read_library(folder: Path) -> dict[str, Any]:
 def unmeasured() -> Mapping[str, LibraryNumber]:
     """Defaults and ranges of the unmeasured values that a case may leave out, by keys of a case."""
     program = Collection("library", "", {})
-    return {key: _number(entry, program) for key, entry in _contents()["unmeasured"].items()}
+    entries = _tables_of_program()["unmeasured"]
+    return {key: _number(entry, program) for key, entry in entries.items()}
