@@ -11,7 +11,7 @@ from walkers.inputs.config_table import present
 from walkers.inputs.resolving.length import cycles_of, samples_of
 from walkers.inputs.resolving.loads import contact_loads, room_of_paths
 from walkers.inputs.resolving.notes import Notes
-from walkers.inputs.resolving.standing import OVERLAP, overlaps
+from walkers.inputs.resolving.standing import OVERLAP, overlap_message
 from walkers.inputs.tables.arrangements import ARRANGEMENTS, BareWalker, WalkerGeometry, touching
 from walkers.inputs.tables.bodies import (
     MOST_BEADS,
@@ -202,7 +202,7 @@ def _check_places(cluster: WalkerGeometry, key: str) -> None:
     if overlapping := touching(places, cluster.radii, -OVERLAP):
         first, second = overlapping[0]
         distances = dist(places[first], places[second]), cluster.rigid_distance(first, second)
-        raise key_error(f"{key}[{second}]", overlaps(f"{key}[{first}]", *distances))
+        raise key_error(f"{key}[{second}]", overlap_message(f"{key}[{first}]", *distances))
     if not any(cluster.front):
         raise key_error(key, "expected some beads ahead of others: this walker has no heading")
     joined = {0}
