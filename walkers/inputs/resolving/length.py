@@ -1,12 +1,18 @@
-"""The time step, the length and the sampling of a run, which follow from the whole case."""
+"""The time step, the length and the sampling of a run, which follow from the whole case.
+
+What the keys of ``[run]`` mean is in `walkers.inputs.tables.run`, the limits of the time step in
+`walkers.physics.time_step`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil, floor, inf
 
 from walkers.errors import key_error
 from walkers.inputs import units
 from walkers.inputs.origins import Source
+from walkers.inputs.tables.bodies import Walkers
 from walkers.inputs.tables.case import Setup
 from walkers.inputs.tables.drive import Excitation
 from walkers.inputs.tables.run import CONSTANT, RunSettings, RunTable, settling_of
@@ -14,31 +20,47 @@ from walkers.physics.time_step import BridgedBead, TimeStepLimits, fit_into_cycl
 from walkers.rounding import percent
 
 MOST_STEPS = 2**31 - 1
+"""Largest number of time steps of a run: the engine counts them with 32 bits."""
 _SEGMENT_SECONDS = 0.5
+"""Length of the segments of runs of loose beads, s."""
 _SETTLING_MARGIN = 1.0
-"""Time, s, that settling may exceed its limit by: it ends with a segment."""
+"""Time by which settling may exceed its limit, s: it ends with a segment."""
 _MOST_CYCLES = 60
+"""Cycles of a run whose length nothing else gives; fewer if velocities are constant earlier."""
 _SAMPLES = 20
-_NEARLY_SYMMETRIC = 0.08  # sin δ of dimers below which speeds of steady walkers still creep …
-_ASLANT = 0.1  # … and start angle (rad) from which walkers turn for longer than a few cycles: both run in full
+"""Samples a cycle of the motion of walkers."""
+_NEARLY_SYMMETRIC = 0.08
+"""Asymmetry sin δ of dimers below which the speeds of steady walkers still creep: they run in
+full."""
+_ASLANT = 0.1
+"""Start angle from which walkers turn for longer than a few cycles, rad: they run in full."""
 _LONGEST_SETTLING = 0.5
+"""Longest settling of loose beads, s."""
 _SETTLED_BELOW = 5e-3
+"""Root mean square velocity of a settled pile of loose beads, m/s."""
 _FRAMES_PER_SECOND = 60.0
+"""Samples a second of the motion of loose beads."""
 
 
 def limits_of(case: Setup) -> TimeStepLimits:
     """Limits of the time step for the bodies of a case."""
-    contact, placed = case.contact, sorted(bead.radius for bead in case.placed)
-    bridged = [entry for body in case.bodies for entry in body.bridged]
-    bridged += [(placed[-1], placed[:1]), (placed[0], placed[-1:])] if placed else []
-    damping = case.boundary.geometry.damping
+    bridged: list[tuple[float, Sequence[float]]] = []
+    for body in case.bodies:
+        bridged += body.bridged
+    placed = sorted(bead.radius for bead in case.placed)
+    if placed:
+        smallest = placed[0]
+        largest = placed[-1]
+        bridged.append((largest, [smallest]))
+        bridged.append((smallest, [largest]))
+    shape = case.boundary.geometry
     return time_step_limits(
-        [BridgedBead(radius, neighbours, damping(radius)) for radius, neighbours in bridged],
+        [(radius, neighbours, shape.damping(radius)) for radius, neighbours in bridged],
         density=case.beads.density,
-        youngs_modulus=contact.youngs_modulus,
-        poissons_ratio=contact.poissons_ratio,
+        youngs_modulus=case.contact.youngs_modulus,
+        poissons_ratio=case.contact.poissons_ratio,
         liquid=case.liquid.of_bridges,
-        roughness=contact.roughness,
+        roughness=case.contact.roughness,
         peak_velocity=case.excitation.peak_velocity,
     )
 
@@ -53,10 +75,10 @@ def resolved_run(case: Setup) -> tuple[RunSettings, dict[str, Source]]:
 
     Returns
     -------
-    run : Run
+    run : RunSettings
         The run with all values.
     sources : dict of str to Source
-        Where values are from that the file does not give, by their keys.
+        Sources of the values that the file does not give, by their keys.
 
     Raises
     ------
@@ -64,53 +86,58 @@ def resolved_run(case: Setup) -> tuple[RunSettings, dict[str, Source]]:
         If a key of ``[run]`` contradicts another one, or if the run is too short or too long.
     """
     table = case.run
-    frequency = case.excitation.frequency
-    samples, cycles_per_sample = samples_of(table, case.excitation, loose=case.loose)
+    drive = case.excitation
+    samples, cycles_per_sample = samples_of(table, drive, loose=case.loose)
     samples_per_bridge_sample = _samples_per_bridge_sample(case, samples)
-    largest, reason = _largest_step(case)
-    time_step, steps = fit_into_cycle(largest, frequency, samples)
-    cycles = cycles_of(table, case.excitation, cycles_per_sample)
+    largest_step, reason = _largest_step(case)
+    time_step, steps_per_cycle = fit_into_cycle(largest_step, drive.frequency, samples)
+    cycles = cycles_of(table, drive, cycles_per_sample)
     until_steady = _until_steady(case, cycles_per_sample)
-    settling = table.settling_cycles
-    if settling is None:
-        settling = settling_of(cycles) if case.walkers else 0
-    rest = table.longest_settling
-    if rest is None and case.loose:
-        rest = _LONGEST_SETTLING
+    settling_cycles = table.settling_cycles
+    if settling_cycles is None:
+        settling_cycles = settling_of(cycles) if case.walkers else 0
+    longest_settling = table.longest_settling
+    if longest_settling is None and case.loose:
+        longest_settling = _LONGEST_SETTLING
+    settled_below = None
+    if longest_settling:
+        settled_below = table.settled_below or _SETTLED_BELOW
     run = table.completed(
         RunSettings,
         {
             "time_step": time_step,
-            "steps_per_cycle": steps,
+            "steps_per_cycle": steps_per_cycle,
             "cycles": cycles,
-            "settling_cycles": settling,
+            "settling_cycles": settling_cycles,
             "until_steady": until_steady,
             "samples_per_cycle": samples,
             "cycles_per_sample": cycles_per_sample,
             "samples_per_bridge_sample": samples_per_bridge_sample,
             "cycles_per_segment": _cycles_per_segment(case, cycles, cycles_per_sample),
-            "settled_below": (table.settled_below or _SETTLED_BELOW) if rest else None,
-            "longest_settling": rest or None,
+            "settled_below": settled_below,
+            "longest_settling": longest_settling or None,
         },
     )
-    most = MOST_STEPS // steps
-    if rest:
-        most -= ceil((rest + _SETTLING_MARGIN) * frequency)
-        if most < 1:
-            longest = MOST_STEPS * time_step - _SETTLING_MARGIN
-            message = f"expected less than {longest:.3g} s: the engine counts steps up to 2^31"
+    most_cycles = MOST_STEPS // steps_per_cycle
+    if longest_settling:
+        most_cycles -= ceil((longest_settling + _SETTLING_MARGIN) * drive.frequency)
+        if most_cycles < 1:
+            limit = MOST_STEPS * time_step - _SETTLING_MARGIN
+            message = f"expected less than {limit:.3g} s: the engine counts steps up to 2^31"
             raise key_error("run.longest_settling", message)
-    _check_length(case, run, most)
+    _check_length(case, run, most_cycles)
     return run, _sources(run, case, reason)
 
 
 def _largest_step(case: Setup) -> tuple[float, str]:
-    """The largest time step of a case, s, and where it is from; one beyond a limit is refused."""
-    table, limits = case.run, limits_of(case)
+    """The largest time step of a case, s, and where it is from; refuses one beyond a limit."""
+    table = case.run
+    limits = limits_of(case)
     if table.time_step is None:
         largest, reason = limits.recommended(loose=case.loose)
     else:
-        largest, reason = table.time_step, "given"
+        largest = table.time_step
+        reason = "given"
     exceeded = limits.exceeded_by(largest)
     if exceeded and not table.allow_unstable:
         allowed = f"{min(vars(limits).values()) * 1e6:.3g} us"
@@ -120,7 +147,7 @@ def _largest_step(case: Setup) -> tuple[float, str]:
 
 
 def _cycles_per_segment(case: Setup, cycles: int, cycles_per_sample: int) -> int:
-    """Cycles of a segment, which ends with a sample, so that each begins where the last one ended."""
+    """Cycles of a segment, which ends with a sample, so that the next one begins where it ends."""
     segment = case.run.segment
     if segment is None:
         segment = _SEGMENT_SECONDS if case.loose else inf
@@ -131,167 +158,231 @@ def _cycles_per_segment(case: Setup, cycles: int, cycles_per_sample: int) -> int
 def cycles_of(table: RunTable, drive: Excitation, cycles_per_sample: int) -> int:
     """Number of cycles of a run, a multiple of the cycles between samples.
 
-    It follows from ``cycles``, ``most_cycles`` or ``duration``. Without them, a run lasts to the
+    It follows from ``duration``, ``cycles`` or ``most_cycles``. Without them, a run lasts to the
     end of its ramp, to the last whole cycle of a record that does not repeat, or for 60 cycles. A
     duration within a record ends with the last whole cycle of the record at the latest.
+
+    Parameters
+    ----------
+    table
+        The table ``[run]`` of a case file.
+    drive
+        The oscillations of the drive.
+    cycles_per_sample
+        Cycles between samples, at least 1.
     """
-    fewest, most = drive.cycle_limits
-    all_of_record = inf
+    fewest, most = drive.cycles
+    cycles_of_record = 0
     if drive.ends:
-        all_of_record = floor((most + 1e-9) / cycles_per_sample) * cycles_per_sample
+        cycles_of_record = floor((most + 1e-9) / cycles_per_sample) * cycles_per_sample
     if table.duration is not None:
-        needed = ceil(table.duration * drive.frequency * (1.0 - 1e-12) / cycles_per_sample)
-        cycles = needed * cycles_per_sample
-        within_record = table.duration <= drive.length * (1.0 + 1e-9)
-        return int(min(cycles, all_of_record)) if within_record else cycles
-    needed = table.cycles or table.most_cycles or ceil(fewest)
-    if not needed and drive.ends:
-        return int(all_of_record)
-    return ceil((needed or _MOST_CYCLES) / cycles_per_sample) * cycles_per_sample
+        samples = ceil(table.duration * drive.frequency * (1.0 - 1e-12) / cycles_per_sample)
+        cycles = samples * cycles_per_sample
+        if drive.ends and table.duration <= drive.length * (1.0 + 1e-9):
+            cycles = min(cycles, cycles_of_record)
+        return cycles
+    if table.cycles:
+        needed = table.cycles
+    elif table.most_cycles:
+        needed = table.most_cycles
+    elif fewest > 0.0:
+        needed = ceil(fewest)
+    elif drive.ends:
+        return cycles_of_record
+    else:
+        needed = _MOST_CYCLES
+    return ceil(needed / cycles_per_sample) * cycles_per_sample
 
 
 def _sources(run: RunSettings, case: Setup, reason: str) -> dict[str, Source]:
-    """Sources of the values of a run that its table does not give."""
-    cycles_from, cycles, settling = (
-        "from the duration" if run.duration else "not checked earlier",
-        "",
-        "",
-    )
-    if case.excitation.ends and not run.duration:
-        cycles_from = f"of the {case.excitation.length:.4g} s of the record"
-    if run.until_steady:
-        cycles_from = "checked after 12 and 24 cycles"
-        cycles = f"until constant within {percent(CONSTANT)}, at most {run.cycles}"
-        settling = ", ".join(f"{settling_of(number)} of {number}" for number in run.attempts)
-    often = "" if run.cycles_per_sample == 1 else f"1 in {run.cycles_per_sample} cycles"
-    if often:
-        cycles_from += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
-    by_time = case.loose or bool(run.frames_per_second)
+    """Sources of the values of a run that its table does not give, by their keys.
+
+    ``reason`` says which limit the time step is from.
+    """
     sources = {
-        "run.samples_per_cycle": Source(
-            "derived" if by_time else "default", "from frames_per_second" * by_time, often
-        ),
+        "run.samples_per_cycle": _source_of_samples(run, case),
         "run.time_step": Source("derived", f"auto: {reason}, a whole number of steps per cycle"),
-        "run.cycles": Source("derived", cycles_from, cycles),
-        "run.settling_cycles": Source("derived", "a third of the cycles, at most 20", settling),
+        "run.cycles": _source_of_cycles(run, case),
+        "run.settling_cycles": _source_of_settling_cycles(run, case),
         "run.longest_settling": Source("default", "of loose beads"),
         "run.settled_below": Source("default"),
     }
     if case.loose:
-        length = units.quantity_text(
-            run.cycles_per_segment / case.excitation.frequency, units.DURATION
-        )
+        seconds = run.cycles_per_segment / case.excitation.frequency
+        length = units.quantity_text(seconds, units.DURATION)
         sources["run.segment"] = Source("derived", "about 0.5 s", length)
-    if not case.walkers:
-        sources["run.settling_cycles"] = Source("default", "of loose beads")
     return sources
 
 
-def _check_length(case: Setup, run: RunSettings, longest: float) -> None:
-    """Refuse a run that is too short or too long for what is measured, for its drive, or for the engine (cycles)."""
-    drive, cycles, settling, every = (
-        case.excitation,
-        run.cycles,
-        run.settling_cycles,
-        run.cycles_per_sample,
-    )
-    (fewest, most), name = (
-        drive.cycle_limits,
-        "run.cycles" if run.duration is None else "run.duration",
-    )
+def _source_of_samples(run: RunSettings, case: Setup) -> Source:
+    text = ""
+    if run.cycles_per_sample != 1:
+        text = f"1 in {run.cycles_per_sample} cycles"
+    if case.loose or run.frames_per_second:
+        return Source("derived", "from frames_per_second", text)
+    return Source("default", text=text)
+
+
+def _source_of_cycles(run: RunSettings, case: Setup) -> Source:
+    text = ""
+    if run.until_steady:
+        why = "checked after 12 and 24 cycles"
+        text = f"until constant within {percent(CONSTANT)}, at most {run.cycles}"
+    elif run.duration:
+        why = "from the duration"
+    elif case.excitation.ends:
+        why = f"of the {case.excitation.length:.4g} s of the record"
+    else:
+        why = "not checked earlier"
+    if run.cycles_per_sample != 1:
+        why += f", rounded up to a multiple of {run.cycles_per_sample} cycles (one sample)"
+    return Source("derived", why, text)
+
+
+def _source_of_settling_cycles(run: RunSettings, case: Setup) -> Source:
+    if not case.walkers:
+        return Source("default", "of loose beads")
+    text = ""
+    if run.until_steady:
+        text = ", ".join(f"{settling_of(cycles)} of {cycles}" for cycles in run.attempts)
+    return Source("derived", "a third of the cycles, at most 20", text)
+
+
+def _check_length(case: Setup, run: RunSettings, most_cycles: int) -> None:
+    """Refuse a run that is too short or too long for what is measured, its drive, or the engine.
+
+    ``most_cycles`` are those that the engine can count.
+    """
+    key = "run.cycles" if run.duration is None else "run.duration"
     if run.until and case.mixture is None:
         raise key_error(
             "run.until", "expected none: only clusters of a [mixture] climb out of a pile"
         )
-    if cycles < 2:
-        raise key_error(
-            name, f"expected at least two cycles of the drive, {2.0 / drive.frequency:.4g} s"
-        )
-    if cycles - settling < 2:
-        raise key_error("run.settling_cycles", f"expected at most cycles - 2 = {cycles - 2}")
-    if case.walkers and cycles // every <= run.settled_strobes:
-        message = f"expected more: one frame in {every} cycles leaves none after {settling} settling cycles"
+    _check_measured_cycles(case, run, key)
+    _check_cycles_of_drive(case.excitation, run, key)
+    if run.cycles > most_cycles:
+        limit = f"{most_cycles}"
+        if run.duration is not None:
+            limit = f"{most_cycles // case.excitation.frequency:g} s"
+        raise key_error(key, f"expected at most {limit}: the engine counts steps up to 2^31")
+
+
+def _check_measured_cycles(case: Setup, run: RunSettings, key: str) -> None:
+    """Refuse a run with too few cycles or samples after settling; ``key`` gives its length."""
+    if run.cycles < 2:
+        seconds = 2.0 / case.excitation.frequency
+        raise key_error(key, f"expected at least two cycles of the drive, {seconds:.4g} s")
+    settling = run.settling_cycles
+    if run.cycles - settling < 2:
+        raise key_error("run.settling_cycles", f"expected at most cycles - 2 = {run.cycles - 2}")
+    if case.walkers and run.cycles // run.cycles_per_sample <= run.settled_strobes:
+        frames = f"one frame in {run.cycles_per_sample} cycles"
+        message = f"expected more: {frames} leaves none after {settling} settling cycles"
         raise key_error("run.frames_per_second", message)
-    if (
-        drive.record
-        and (apart := drive.record.length / (len(drive.record.rows) - 1)) < run.time_step
-    ):
-        rows = f"its rows, {1e6 * apart:.3g} us apart, are closer than the time step, {1e6 * run.time_step:.3g} us"
-        raise key_error(
-            "drive.record",
-            f"{rows}; expected fewer rows, or a shorter run.time_step",
-            drive.record.file,
-        )
-    if cycles < fewest:
-        raise key_error(
-            name, f"expected at least {ceil(fewest)} cycles, {drive.ramp[-1][0]:g} s, of drive.ramp"
-        )
-    if cycles > most + 1e-9:
-        message = (
-            "drive.record has no more; drive.repeats = true repeats one that ends as it begins"
-        )
-        raise key_error(name, f"expected at most {int(most)} cycles: {message}")
-    if cycles > longest:
-        limit = f"{longest}" if run.duration is None else f"{longest // drive.frequency:g} s"
-        raise key_error(name, f"expected at most {limit}: the engine counts steps up to 2^31")
+
+
+def _check_cycles_of_drive(drive: Excitation, run: RunSettings, key: str) -> None:
+    """Refuse a run that is too coarse, too short or too long for its record or ramp."""
+    record = drive.record
+    if record:
+        interval = record.length / (len(record.rows) - 1)
+        if interval < run.time_step:
+            rows = f"its rows, {1e6 * interval:.3g} us apart, are closer than the time step"
+            message = f"{rows}, {1e6 * run.time_step:.3g} us; expected fewer rows"
+            raise key_error("drive.record", f"{message}, or a shorter run.time_step", record.file)
+    fewest, most = drive.cycles
+    if run.cycles < fewest:
+        end_of_ramp = f"{drive.ramp[-1][0]:g} s"
+        message = f"expected at least {ceil(fewest)} cycles, {end_of_ramp}, of drive.ramp"
+        raise key_error(key, message)
+    if run.cycles > most + 1e-9:
+        message = "drive.repeats = true repeats one that ends as it begins"
+        expected = f"expected at most {int(most)} cycles"
+        raise key_error(key, f"{expected}: drive.record has no more; {message}")
 
 
 def samples_of(table: RunTable, drive: Excitation, *, loose: bool) -> tuple[int, int]:
-    """Samples a cycle and cycles a sample, one of which is 1."""
+    """Samples a cycle and cycles a sample, one of which is 1.
+
+    Parameters
+    ----------
+    table
+        The table ``[run]`` of a case file.
+    drive
+        The oscillations of the drive.
+    loose
+        Whether the case has loose beads, which are sampled in real time.
+    """
     if table.samples_per_cycle is not None:
         return table.samples_per_cycle, 1
     if table.frames_per_second is None and not loose:
         return _SAMPLES, 1
-    needed = drive.frequency / (table.frames_per_second or _FRAMES_PER_SECOND)
-    return (round(1.0 / needed), 1) if needed < 1.0 else (1, round(needed))
+    cycles_per_sample = drive.frequency / (table.frames_per_second or _FRAMES_PER_SECOND)
+    if cycles_per_sample < 1.0:
+        return round(1.0 / cycles_per_sample), 1
+    return 1, round(cycles_per_sample)
 
 
 def _samples_per_bridge_sample(case: Setup, samples: int) -> int:
     """Samples of the beads for one of the bridges, given the samples of the beads a cycle."""
-    name, bridges = "run.bridge_samples_per_cycle", case.run.bridge_samples_per_cycle
+    key = "run.bridge_samples_per_cycle"
+    bridges = case.run.bridge_samples_per_cycle
     if bridges is None:
         return 1 if case.loose else samples
     if case.loose:
-        raise key_error(name, "expected none: bridges of loose beads are in every frame")
+        raise key_error(key, "expected none: bridges of loose beads are in every frame")
     if samples % bridges:
-        raise key_error(name, f"expected a divisor of samples_per_cycle = {samples}")
+        raise key_error(key, f"expected a divisor of samples_per_cycle = {samples}")
     return samples // bridges
 
 
 def _until_steady(case: Setup, cycles_per_sample: int) -> bool:
-    """Whether a run may end when its velocities are constant; not if the case gives its length or segments."""
+    """Whether a run may end when its velocities are constant.
+
+    It may not if the case gives its length or segments.
+    """
     table = case.run
-    until = ["cycles"] if "cycles" in table.model_fields_set and table.cycles is None else []
-    until += ["most_cycles"] if table.most_cycles is not None else []
-    given = [
-        name
-        for name in ("cycles", "duration", "settling_cycles", "segment")
-        if getattr(table, name) is not None
-    ]
-    if given and until:
-        message = (
-            f"expected none: with run.{until[0]}, walkers run until their velocity is constant"
-        )
-        raise key_error(f"run.{given[0]}", message)
-    if until and not case.apart:
-        raise key_error(
-            f"run.{until[0]}", "expected run.duration: a run until steady needs independent walkers"
-        )
-    if until and case.excitation.changes:
-        changing = (
-            "with drive.ramp" if case.drive.ramp else "with the changing amplitude of drive.record"
-        )
-        raise key_error(
-            f"run.{until[0]}", f"expected a number of cycles: {changing} no velocity is constant"
-        )
-    if case.excitation.ends and not until:
+    key = _key_until_steady(table)
+    length_keys = ("cycles", "duration", "settling_cycles", "segment")
+    given = [name for name in length_keys if getattr(table, name) is not None]
+    if key is not None:
+        if given:
+            message = f"expected none: with {key}, walkers run until their velocity is constant"
+            raise key_error(f"run.{given[0]}", message)
+        _check_can_become_steady(case, key)
+    elif case.excitation.ends:
         return False
     if case.drive.ramp or not case.apart or given or table.ranks != 1 or cycles_per_sample != 1:
         return False
-    # A few cycles suffice for asymmetric dimers that start near the axis.
-    return all(
-        len(walkers.radii) == 2
-        and abs(walkers.radii[0] - walkers.radii[1]) / sum(walkers.radii) >= _NEARLY_SYMMETRIC
-        and abs(walkers.angle) + walkers.angle_spread < _ASLANT
-        for walkers in case.walkers
-    )
+    return all(_is_soon_steady(walkers) for walkers in case.walkers)
+
+
+def _key_until_steady(table: RunTable) -> str | None:
+    """The key by which a case asks for a run until velocities are constant, if it does."""
+    if "cycles" in table.model_fields_set and table.cycles is None:
+        return "run.cycles"
+    if table.most_cycles is not None:
+        return "run.most_cycles"
+    return None
+
+
+def _check_can_become_steady(case: Setup, key: str) -> None:
+    """Refuse to run until velocities are constant if walkers may meet, or the drive changes."""
+    if not case.apart:
+        message = "a run until steady needs independent walkers"
+        raise key_error(key, f"expected run.duration: {message}")
+    if case.excitation.changes:
+        changing = "with the changing amplitude of drive.record"
+        if case.drive.ramp:
+            changing = "with drive.ramp"
+        raise key_error(key, f"expected a number of cycles: {changing} no velocity is constant")
+
+
+def _is_soon_steady(walkers: Walkers) -> bool:
+    """Whether a few cycles suffice: for asymmetric dimers that start near the drive axis."""
+    if len(walkers.radii) != 2:
+        return False
+    first, second = walkers.radii
+    asymmetry = abs(first - second) / sum(walkers.radii)
+    largest_angle = abs(walkers.angle) + walkers.angle_spread
+    return asymmetry >= _NEARLY_SYMMETRIC and largest_angle < _ASLANT
