@@ -1,4 +1,7 @@
-"""Loads of the contacts of a walker at rest, and the room that walkers need."""
+"""Loads of the contacts of beads at rest, and how far walkers move from their starts.
+
+The laws themselves are in `walkers.physics`: here they are applied to the beads of a case.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,45 @@ from walkers.physics.capillary import bead_volume, largest_normal
 from walkers.physics.contact import hertz_overlap, hertz_stiffness, reduced_modulus
 from walkers.physics.dimer import Dimer
 
+LARGEST_DELAY = 0.025
+"""Delay of contacts by bridges up to which velocities are within 2 % of those of rigid beads,
+rad."""
+_NOTICED_DELAY = 0.1
+"""Smallest delay of loose beads at which a result warns of their softness, rad."""
+_MEASURED_DELAYS = (0.0, 0.13, 0.34, 1.5, 3.8)
+"""Delays of the shipped climbers, rad: with glycerol 87 % at 200 and 50 MPa, with glycerol at 200
+and 50 MPa."""
+_MEASURED_ERRORS = (0.0, 0.03, 0.09, 0.15, 1.3)
+"""Relative errors of the speed of climbing at these delays: the largest for a diamond, a dimer
+and a cluster in a corner, compared with beads of 12.8 GPa. At the last delay, the dimer goes
+down."""
+_LARGEST_SPEED = 0.3
+"""Speed of walkers for which there is space, over the peak velocity of the substrate.
+
+Walkers move at a few per cent of this velocity; the fastest that was seen, at Γ0 = 0.76 and
+friction 0.5, at 0.14 of it. The rest is for walkers that hop, and for those that turn aside."""
+
+
+class Load(NamedTuple):
+    """A contact at rest.
+
+    Attributes
+    ----------
+    surfaces
+        The two surfaces, and the bridge between them.
+    pull
+        Capillary force of the bridge, N; negative if it pushes.
+    rupture
+        Rupture distance of the bridge, m.
+    overlap
+        Overlap of the surfaces, m.
+    """
+
+    surfaces: Surfaces
+    pull: float
+    rupture: float
+    overlap: float = 0.0
+
 
 def dimer_of(case: Setup) -> Dimer:
     """The dimer of a case; raises `ValueError` unless its first walkers are dimers."""
@@ -26,85 +68,104 @@ def dimer_of(case: Setup) -> Dimer:
     return Dimer((radii[0], radii[1]), case.beads.density, case.liquid.surface_tension)
 
 
-class Load(NamedTuple):
-    """A contact at rest: its surfaces, pull (N) and rupture distance (m) of its bridge, and the overlap (m)."""
-
-    surfaces: Surfaces
-    pull: float
-    rupture: float
-    overlap: float = 0.0
-
-
-def bridge_at_rest(case: Setup, radius: float, other_radius: float) -> Load:
-    """The bridge of a bead to another, or to a plane (a radius of infinity), by the case's law; radii in m."""
-    return _at_rest(case.law, surfaces_of(case, radius, other_radius))
-
-
 def surfaces_of(case: Setup, radius: float, other_radius: float) -> Surfaces:
-    """A bead of a case and another bead or a plane (a radius of infinity), with a bridge between them; radii in m."""
+    """A bead of a case and another bead or a plane, with the bridge between them.
+
+    Parameters
+    ----------
+    case
+        The case.
+    radius
+        Radius of the bead, m.
+    other_radius
+        Radius of the other bead, m; infinite for a plane.
+    """
     return Surfaces.between(radius, other_radius, case.liquid.of_bridges, case.contact.roughness)
 
 
+def bridge_at_rest(case: Setup, radius: float, other_radius: float) -> Load:
+    """The bridge between surfaces that touch, by the law of the case; radii as for
+    `surfaces_of`.
+    """
+    return _bridge_in_contact(case.law, surfaces_of(case, radius, other_radius))
+
+
 @lru_cache(maxsize=1024)  # points of a sweep have the same few bridges
-def _at_rest(law: BridgeLaw, surfaces: Surfaces) -> Load:
+def _bridge_in_contact(law: BridgeLaw, surfaces: Surfaces) -> Load:
+    """The bridge of a law between surfaces that touch, without overlap."""
     curve = law(surfaces)
-    touching = np.zeros(1)
-    pull = curve.pull(touching) if curve.pull else curve.forces(touching).pull
+    gap = np.zeros(1)
+    pull = curve.pull(gap) if curve.pull else curve.forces(gap).pull
     return Load(surfaces, float(pull[0]), curve.rupture)
 
 
 def resistances_at_rest(
     case: Setup, radius: float, other_radius: float
 ) -> tuple[float, float, float]:
-    """S (N s/m), C (N s) and Q (N m s) of that bridge, the smaller bead as body 1 (`walkers.physics.bridge`)."""
-    touching = case.law(surfaces_of(case, radius, other_radius)).forces(np.zeros(1))
-    _, _, sliding, coupling, rolling = map(float, touching.columns()[0])
-    return sliding, coupling, rolling
+    """Resistances of the bridge between surfaces that touch.
 
+    Parameters
+    ----------
+    case, radius, other_radius
+        As for `surfaces_of`. The smaller bead, or the bead at a plane, is body 1
+        (`walkers.physics.bridge`).
 
-LARGEST_DELAY = 0.025
-"""Largest delay of contacts by bridges, rad, at which velocities are within 2 % of those of rigid beads."""
-
-
-_NOTICED_DELAY = 0.1
-"""Smallest delay of loose beads at which a result warns of their softness, rad."""
-_MEASURED_DELAYS = (0.0, 0.13, 0.34, 1.5, 3.8)
-"""Delays of the shipped climbers, rad: with glycerol 87 % at 200 and 50 MPa, with glycerol at 200 and 50 MPa."""
-_MEASURED_ERRORS = (0.0, 0.03, 0.09, 0.15, 1.3)
-"""The largest share by which one of them (diamond, dimer, cluster in a corner) then climbs faster or
-more slowly than with beads of 12.8 GPa. At the last one, the dimer goes down."""
+    Returns
+    -------
+    sliding : float
+        S, N s/m.
+    coupling : float
+        C, N s.
+    rolling : float
+        Q, N m s.
+    """
+    forces = case.law(surfaces_of(case, radius, other_radius)).forces(np.zeros(1))
+    _, _, sliding, coupling, rolling = forces.columns()[0]
+    return float(sliding), float(coupling), float(rolling)
 
 
 def softness_warning(case: Setup) -> str | None:
     """How far the delay of contacts changes the speeds of the loose beads of a case.
 
-    None below `_NOTICED_DELAY`.
+    Returns
+    -------
+    str or None
+        A sentence; None for a delay below 0.1 rad.
     """
     phase = delay_of_loose_beads(case)
     if phase < _NOTICED_DELAY:
         return None
-    soft = f"soft beads: bridges delay contacts by {phase:.2g} rad; the speeds of climbing clusters are then"
+    problem = f"soft beads: bridges delay contacts by {phase:.2g} rad"
     if phase > _MEASURED_DELAYS[-1]:
-        return f"{soft} wrong, even in their direction (set a higher contact.youngs_modulus)"
-    error = 100.0 * float(np.interp(phase, _MEASURED_DELAYS, _MEASURED_ERRORS))
-    return f"{soft} up to {error:.0f} % off those of hard beads (contact.youngs_modulus)"
+        error = "wrong, even in their direction (set a higher contact.youngs_modulus)"
+    else:
+        percentage = 100.0 * float(np.interp(phase, _MEASURED_DELAYS, _MEASURED_ERRORS))
+        error = f"up to {percentage:.0f} % off those of hard beads (contact.youngs_modulus)"
+    return f"{problem}; the speeds of climbing clusters are then {error}"
 
 
 def gravity_warnings(case: Setup) -> list[str]:
-    """What is doubtful about bridges of beads that are large or heavy; empty for small beads or without gravity.
+    """Warnings about bridges of beads that are large or heavy.
 
-    The bridge laws leave out gravity. It deforms menisci as large as the capillary length √(γ/ρg), which the bridges of
-    larger beads can be. A bead that is heavier than the pull of its bridge to a plane is not held by the liquid.
+    The bridge laws leave out gravity. It deforms menisci as large as the capillary length
+    √(γ/ρg), which the bridges of larger beads can be. The liquid does not hold a bead that is
+    heavier than the capillary force of its bridge to a plane.
+
+    Returns
+    -------
+    list of str
+        Sentences; none for small beads, without liquid or without gravity.
     """
     gravity = case.environment.gravity
     if gravity <= 0.0:
         return []
-    radius, liquid = max(case.radii), case.liquid
+    radius = max(case.radii)
     pull = bridge_at_rest(case, radius, inf).pull
     if pull <= 0.0:  # without liquid
         return []
     warnings = []
     beads = f"beads of R = {1e3 * radius:.3g} mm"
+    liquid = case.liquid
     if liquid.density:
         length = sqrt(liquid.surface_tension / (liquid.density * gravity))
         if radius > length:
@@ -120,82 +181,105 @@ def gravity_warnings(case: Setup) -> list[str]:
 
 
 def delay_of(case: Setup) -> float:
-    """The largest phase by which bridges delay any contact of a case, rad: of its walkers and of its loose beads."""
-    return max([delay_of_loose_beads(case), *(delay(case, walkers) for walkers in case.walkers)])
+    """The largest phase by which bridges delay any contact of walkers or loose beads, rad."""
+    delays = [delay(case, walkers) for walkers in case.walkers]
+    delays.append(delay_of_loose_beads(case))
+    return max(delays)
 
 
 def delay(case: Setup, walkers: Walkers) -> float:
-    """Phase by which bridges delay the contacts of walkers in the drive, ωN/k, rad.
+    """The largest phase by which bridges delay the contacts of walkers, ωN/k, rad.
 
-    A contact of stiffness k, loaded by its bridge and weight, follows a changing load with the time constant N/k of the
-    bridge's normal resistance N. Friction is limited by the elastic force, and follows as late. Velocities differ from
-    those of rigid beads by about 0.7 of this phase, and sliding by 2.5 (Figs. 2, 4a and 4b, up to 3.2 GPa).
+    A bridge damps its contact with the normal resistance N, so a contact of stiffness k lags
+    behind a changing load by the time N/k. Friction is limited by the elastic force, and lags as
+    much.
+
+    Velocities differ from those of rigid beads by about 0.7 of this phase, and sliding by 2.5 of it
+    (Figs. 2, 4a and 4b, up to 3.2 GPa).
     """
     return _largest_delay(case, contact_loads(case, walkers))
 
 
 def delay_of_loose_beads(case: Setup) -> float:
-    """The same phase for the placed beads and the mixture of a case, rad: the largest of any two beads or a wall.
+    """The same phase for the placed beads and the mixture of a case, rad.
 
-    The contacts are loaded by their bridges alone, as at an upright wall.
+    It is the largest of any two beads, and of a bead at a wall. The contacts are loaded by their
+    bridges alone, as at an upright wall.
     """
     return _largest_delay(case, _loads_of_loose_beads(case))
 
 
 def _loads_of_loose_beads(case: Setup) -> list[Load]:
-    """Contacts of each radius of the placed beads and the mixture with the wall and with each other radius."""
+    """Contacts of each radius of the placed beads and the mixture with the wall and each radius."""
     radii = {bead.radius for bead in case.placed}
     if case.mixture is not None:
-        radii |= {*case.mixture.small_radii, *case.mixture.large_radii}
-    pairs = combinations_with_replacement([*sorted(radii), inf], 2)
-    return [
-        _with_overlap(case, bridge_at_rest(case, *pair)) for pair in pairs if pair != (inf, inf)
-    ]
+        radii.update(case.mixture.small_radii, case.mixture.large_radii)
+    loads = []
+    for radius, other_radius in combinations_with_replacement([*sorted(radii), inf], 2):
+        if radius < inf:
+            loads.append(_with_overlap(case, bridge_at_rest(case, radius, other_radius)))
+    return loads
 
 
 def _with_overlap(case: Setup, bridge: Load, weight: float = 0.0) -> Load:
-    """A bridge with the overlap at which the repulsion balances its pull and a weight, N."""
+    """A bridge with the overlap at which repulsion balances its capillary force and a weight
+    (N).
+    """
     modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
-    return bridge._replace(
-        overlap=hertz_overlap(bridge.pull + weight, bridge.surfaces.reduced_radius, modulus)
-    )
+    overlap = hertz_overlap(bridge.pull + weight, bridge.surfaces.reduced_radius, modulus)
+    return bridge._replace(overlap=overlap)
 
 
 def _largest_delay(case: Setup, loads: Iterable[Load]) -> float:
     """The largest 2πfN/k of contacts, rad; contacts without a load have none."""
     modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
-    longest = 0.0
+    longest = 0.0  # s
     for load in loads:
         if load.overlap:
-            radius = load.surfaces.reduced_radius
-            resistance = largest_normal(radius, load.surfaces.roughness, load.surfaces.liquid)
-            longest = max(longest, resistance / hertz_stiffness(load.overlap, radius, modulus))
+            surfaces = load.surfaces
+            radius = surfaces.reduced_radius
+            resistance = largest_normal(radius, surfaces.roughness, surfaces.liquid)
+            stiffness = hertz_stiffness(load.overlap, radius, modulus)
+            longest = max(longest, resistance / stiffness)
     return 2.0 * pi * case.excitation.fastest * longest
 
 
 def contact_loads(case: Setup, walkers: Walkers | None = None) -> list[Load]:
-    """The contacts of a case's first (or other) walkers at rest: each bead on the floor, then each pair of beads."""
-    make = walkers or case.walkers[0]
-    density, gravity = case.beads.density, case.pressing_gravity
-    held = [(radius, inf, bead_volume(radius) * density * gravity) for radius in make.radii]
+    """The contacts of a walker at rest.
+
+    Parameters
+    ----------
+    case
+        The case.
+    walkers
+        The kind of the walker; the first one of the case if None.
+
+    Returns
+    -------
+    list of Load
+        The contact of each bead with the substrate, then that of each pair of beads.
+    """
+    kind = walkers or case.walkers[0]
+    density = case.beads.density
+    gravity = case.pressing_gravity
     loads = []
-    pairs = [(make.radii[first], make.radii[second], 0.0) for first, second in make.pairs]
-    for radius, other_radius, weight in [*held, *pairs]:
-        loads.append(_with_overlap(case, bridge_at_rest(case, radius, other_radius), weight))
+    for radius in kind.radii:
+        weight = bead_volume(radius) * density * gravity
+        loads.append(_with_overlap(case, bridge_at_rest(case, radius, inf), weight))
+    for first, second in kind.pairs:
+        bridge = bridge_at_rest(case, kind.radii[first], kind.radii[second])
+        loads.append(_with_overlap(case, bridge))
     return loads
 
 
 def path_length(case: Case) -> float:
-    """Room around the start of a walker, m (`room_of_paths`)."""
+    """Distance from its start within which a walker of a case stays, m (`longest_path`)."""
     longest = max((walkers.length for walkers in case.walkers), default=0.0)
-    return room_of_paths(case.excitation.peak_velocity, case.duration, longest)
+    return longest_path(case.excitation.peak_velocity, case.duration, longest)
 
 
-def room_of_paths(peak_velocity: float, duration: float, longest: float) -> float:
-    """Room around the start of walkers, m.
-
-    Walkers move at a few per cent of the substrate's peak velocity (0.14 of it was the fastest seen, at Γ0 = 0.76
-    and friction 0.5); 0.3 of it through the whole run leaves room for those that hop, and sideways as well.
+def longest_path(peak_velocity: float, duration: float, length: float) -> float:
+    """Distance from their starts within which walkers stay, also those that hop, m.
 
     Parameters
     ----------
@@ -203,17 +287,18 @@ def room_of_paths(peak_velocity: float, duration: float, longest: float) -> floa
         Peak velocity of the substrate, m/s.
     duration
         Duration of the drive, s.
-    longest
+    length
         Length of the longest walker, m.
     """
-    return 0.3 * peak_velocity * duration + 2.0 * longest
+    return _LARGEST_SPEED * peak_velocity * duration + 2.0 * length
 
 
 def hop_height(case: Case) -> float:
-    """Height that a bead thrown up at twice the substrate's peak velocity reaches, m (its reach without gravity)."""
+    """Height that a bead thrown up at twice the peak velocity of the substrate reaches, m.
+
+    It is at most `path_length`, which is its value without gravity.
+    """
     if case.pressing_gravity <= 0.0:
         return path_length(case)
-    return min(
-        (2.0 * case.excitation.peak_velocity) ** 2 / (2.0 * case.pressing_gravity),
-        path_length(case),
-    )
+    speed = 2.0 * case.excitation.peak_velocity
+    return min(speed**2 / (2.0 * case.pressing_gravity), path_length(case))

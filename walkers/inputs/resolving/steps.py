@@ -1,9 +1,10 @@
-"""Values that follow from others: a case of the tables of its file, in the order of the physics.
+"""Values that follow from others: makes a case of the tables of its file, in the order of the
+physics.
 
-`resolve` takes a `CaseFile`, whose values may be missing, completes the tables of its bodies, drive,
-liquid and contacts to a `Setup`, and adds the run, which makes it a `Case`. What the library gives is
-in the tables before (`walkers.inputs.resolving.from_library`). Each step notes where its values are
-from. Checks of the bodies come last.
+`resolve` takes a `CaseFile`, in which values may be missing. It completes the tables of the
+bodies, the drive, the liquid and the contacts to a `Setup`, and adds the run, which makes it a
+`Case`. Each step notes where its values are from. Checks of the bodies come last. Values of the
+library are in the tables already (`walkers.inputs.resolving.from_library`).
 """
 
 from __future__ import annotations
@@ -42,9 +43,11 @@ from walkers.physics.dimer import Dimer
 _SOFTEST = 5e7
 """Lowest Young's modulus of ``"auto"``, Pa."""
 _HARDEST = 4.0**5 * _SOFTEST
-"""Highest one, 51.2 GPa: four times as much is beyond what a case may have."""
-_ROUGHEST = 0.01
-"""Largest roughness over the radius of a bead: the wedge of liquid between smooth spheres is then no model."""
+"""Highest Young's modulus of ``"auto"``, 51.2 GPa: four times as much is beyond what a case may
+have."""
+_LARGEST_ROUGHNESS = 0.01
+"""Largest roughness over the radius of the smallest bead. Beyond it, the surfaces are no longer
+the smooth spheres that the bridge laws assume."""
 
 
 def resolve(
@@ -96,12 +99,16 @@ def resolve(
 def _setup(file: CaseFile, document: Mapping[str, Any], notes: Notes) -> Setup:
     """The case with all values but those of its run; a modulus of ``"auto"`` is the lowest one."""
     drafts = walker_drafts(file, notes)
-    draft_of_mixture = None if file.mixture is None else mixture_draft(file.mixture, notes)
+    draft_of_mixture = None
+    if file.mixture is not None:
+        draft_of_mixture = mixture_draft(file.mixture, notes)
     placed = tuple(placed_bead(bead) for bead in file.placed)
-    radii = [radius for draft in drafts.values() for radius in draft.geometry.radii]
-    radii += [bead.radius for bead in placed]
+    radii = [bead.radius for bead in placed]
+    for draft in drafts.values():
+        radii += draft.geometry.radii
     if draft_of_mixture is not None:
-        radii += draft_of_mixture.small_radii + draft_of_mixture.large_radii
+        radii += draft_of_mixture.small_radii
+        radii += draft_of_mixture.large_radii
     boundary = with_vessel(file.boundary, document, max(radii), notes)
     liquid = _liquid(file.liquid, notes)
     mixture = None
@@ -113,18 +120,24 @@ def _setup(file: CaseFile, document: Mapping[str, Any], notes: Notes) -> Setup:
     walkers = {key: walkers_of(draft, facings[key], spacing) for key, draft in drafts.items()}
     modulus = file.contact.youngs_modulus or _SOFTEST
     contact = file.contact.completed(Contact, {"youngs_modulus": modulus})
-    bodies = {
-        "dimers": walkers.pop("dimers", None),
-        "clusters": tuple(walkers.values()),
-        "mixture": mixture,
-        "placed": placed,
-    }
-    surroundings = {"boundary": boundary, "drive": drive, "liquid": liquid, "contact": contact}
-    return file.completed(Setup, {**bodies, **surroundings})
+    dimers = walkers.pop("dimers", None)
+    return file.completed(
+        Setup,
+        {
+            "dimers": dimers,
+            "clusters": tuple(walkers.values()),
+            "mixture": mixture,
+            "placed": placed,
+            "boundary": boundary,
+            "drive": drive,
+            "liquid": liquid,
+            "contact": contact,
+        },
+    )
 
 
 def _dimer(file: CaseFile, drafts: Mapping[str, WalkerDraft]) -> Dimer | None:
-    """The first walkers of a case as a dimer; None if they are none."""
+    """The first walkers of a case as a dimer; None if there are no walkers, or not of two beads."""
     first = next(iter(drafts.values()), None)
     if first is None or len(first.geometry.radii) != 2:
         return None
@@ -137,84 +150,98 @@ def _liquid(liquid: LiquidTable, notes: Notes) -> Liquid:
     viscosity = liquid.dynamic_viscosity
     if liquid.kinematic_viscosity is not None:
         if liquid.density is None:
-            raise key_error(
-                "liquid.density",
-                "missing; expected the liquid's density beside its kinematic_viscosity",
-            )
+            message = "missing; expected the liquid's density beside its kinematic_viscosity"
+            raise key_error("liquid.density", message)
         viscosity = float(f"{liquid.kinematic_viscosity * liquid.density:.15g}")
         notes.add("liquid.dynamic_viscosity", "from kinematic_viscosity and density")
     return liquid.completed(Liquid, {"dynamic_viscosity": viscosity})
 
 
 def _check_surfaces(case: Setup, notes: Notes) -> None:
-    """Roughness is small compared with the beads, and menisci fit between them and at walls."""
-    liquid, most = case.liquid.of_bridges, _ROUGHEST * min(case.radii)
-    roughness = case.contact.roughness
-    for key, value in zip(ROUGHNESS, (roughness.bead_bead, roughness.bead_wall), strict=True):
-        if value > most * (1.0 + 1e-9):
-            raise key_error(
-                key, f"expected {1e6 * most:.3g} um or less, a hundredth of a bead's radius"
-            )
-        _end_range_at(key, most, notes)
+    """Refuse roughness that is large compared with the beads, and menisci that do not fit."""
+    largest = _LARGEST_ROUGHNESS * min(case.radii)
+    contact_roughness = case.contact.roughness
+    values = (contact_roughness.bead_bead, contact_roughness.bead_wall)
+    for key, roughness in zip(ROUGHNESS, values, strict=True):
+        if roughness > largest * (1.0 + 1e-9):
+            expected = f"{1e6 * largest:.3g} um or less, a hundredth of a bead's radius"
+            raise key_error(key, f"expected {expected}")
+        _end_range_at(key, largest, notes)
+    if case.liquid.meniscus_radius:
+        _check_menisci(case)
+
+
+def _check_menisci(case: Setup) -> None:
+    """Refuse menisci of a radius that do not fit between beads, or between a bead and a wall."""
     try:
-        for radius in case.radii if liquid.meniscus_radius else ():
-            for opposite in (*case.radii, inf):
-                bridge_volume(radius, opposite, liquid)
+        for radius in case.radii:
+            for other_radius in (*case.radii, inf):
+                bridge_volume(radius, other_radius, case.liquid.of_bridges)
     except ValueError as error:
-        raise key_error(
-            "liquid.meniscus_radius", f"expected menisci that fit between the surfaces: {error}"
-        ) from error
+        message = f"expected menisci that fit between the surfaces: {error}"
+        raise key_error("liquid.meniscus_radius", message) from error
 
 
-def _end_range_at(key: str, most: float, notes: Notes) -> None:
-    """End the range of a length, m, where the value would be refused."""
+def _end_range_at(key: str, largest: float, notes: Notes) -> None:
+    """End the range of a length at the largest value (m) that is not refused."""
     source = notes.sources.get(key)
-    if source is None or source.range is None or parse_quantity(source.range[1], LENGTH) <= most:
+    if source is None or source.range is None:
+        return
+    if parse_quantity(source.range[1], LENGTH) <= largest:
         return
     low, unit = source.range[0].split()
-    highest = f"{most / parse_quantity(f'1 {unit}', LENGTH):.6g} {unit}"
+    highest = f"{largest / parse_quantity(f'1 {unit}', LENGTH):.6g} {unit}"
     notes.sources[key] = source._replace(range=(f"{low} {unit}", highest))
 
 
 def _check_law(case: Setup) -> None:
-    """Laws but the default one may refuse the beads or the liquid of a case."""
-    if case.liquid.law != DEFAULT_LAW:
-        try:
-            for radius in case.radii:
-                bridge_at_rest(case, radius, inf)
-        except ValueError as error:
-            raise key_error("liquid.law", str(error)) from error
+    """Refuse beads or a liquid for which the law of the bridges does not hold.
 
-
-def _hardened(softened: Setup, notes: Notes) -> Setup:
-    """The case with the Young's modulus of ``"auto"``, given with the lowest one.
-
-    It is the lowest at which bridges delay contacts little (`LARGEST_DELAY`). In a mixture a higher
-    modulus must not shorten the time step: hard beads would cost several times as much.
+    The default law holds for all of them.
     """
-    while delay_of(softened) > LARGEST_DELAY and softened.contact.youngs_modulus < _HARDEST:
-        modulus = 4.0 * softened.contact.youngs_modulus
-        harder = softened.with_values(contact=softened.contact.with_values(youngs_modulus=modulus))
-        if softened.mixture is not None and _longest_step(harder) < _longest_step(softened):
+    if case.liquid.law == DEFAULT_LAW:
+        return
+    try:
+        for radius in case.radii:
+            bridge_at_rest(case, radius, inf)
+    except ValueError as error:
+        raise key_error("liquid.law", str(error)) from error
+
+
+def _hardened(softest: Setup, notes: Notes) -> Setup:
+    """The case with the Young's modulus of ``"auto"``, from the case with the lowest modulus.
+
+    The modulus is the lowest at which bridges delay contacts little (`LARGEST_DELAY`). In a mixture
+    it is raised only as long as this does not shorten the time step: hard beads would cost several
+    times as much.
+    """
+    case = softest
+    while delay_of(case) > LARGEST_DELAY and case.contact.youngs_modulus < _HARDEST:
+        modulus = 4.0 * case.contact.youngs_modulus
+        harder = case.with_values(contact=case.contact.with_values(youngs_modulus=modulus))
+        if case.mixture is not None and _longest_step(harder) < _longest_step(case):
             break
-        softened = harder
-    notes.add(
-        "contact.youngs_modulus", f"auto: bridges delay contacts by {delay_of(softened):.1g} rad"
-    )
-    return softened
+        case = harder
+    why = f"auto: bridges delay contacts by {delay_of(case):.1g} rad"
+    notes.add("contact.youngs_modulus", why)
+    return case
 
 
 def _longest_step(case: Setup) -> float:
     """The time step that is recommended for a case, s."""
-    return limits_of(case).recommended(loose=case.loose)[0]
+    step, _ = limits_of(case).recommended(loose=case.loose)
+    return step
 
 
 def _with_uphill(case: Setup, notes: Notes) -> Boundary:
-    """The boundary with the direction of the steepest way up, from the x axis toward y."""
+    """The boundary with the direction of its steepest ascent, from the x axis toward y, rad.
+
+    The case file gives it from the direction of the drive.
+    """
     boundary = case.boundary
     if not boundary.tilt:
         return boundary.with_values(uphill=0.0)
-    along, across, _ = case.drive_axis
     if boundary.uphill == 0.0:
         notes.add("boundary.uphill", "the direction of the drive", "default", "0 deg")
-    return boundary.with_values(uphill=atan2(across, along) + boundary.uphill)
+    x, y, _ = case.drive_axis
+    return boundary.with_values(uphill=atan2(y, x) + boundary.uphill)
