@@ -1,1 +1,3 @@
-"""What follows from a case file: values of the library, defaults, loads of contacts, and where beads start."""
+"""What follows from a case file: values of the library, defaults, loads of contacts, and where
+beads start.
+"""

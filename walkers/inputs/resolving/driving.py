@@ -1,4 +1,8 @@
-"""The drive of a case with all values: axes, and peak accelerations by the Γ0 of a dimer."""
+"""The drive of a case with all values: axes, and peak accelerations from the Γ0 of a dimer.
+
+What the keys of ``[drive]`` mean, and the oscillations themselves, are in
+`walkers.inputs.tables.drive`.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +24,8 @@ from walkers.inputs.tables.drive import (
 from walkers.inputs.units import ACCELERATION, quantity_text
 from walkers.physics.dimer import Dimer
 
-_MEET = 0.01  # largest difference of the ends of a record that repeats, over its peak acceleration
+_LARGEST_MISMATCH = 0.01
+"""Largest difference of the ends of a record that repeats, over its peak acceleration."""
 
 
 def drive_of(table: DriveTable, boundary: Boundary, dimer: Dimer | None, notes: Notes) -> Drive:
@@ -31,9 +36,9 @@ def drive_of(table: DriveTable, boundary: Boundary, dimer: Dimer | None, notes: 
     table
         The drive as the file says it.
     boundary
-        The boundary; containers are shaken along z, others along x.
+        The boundary; by default, containers are shaken along z, substrates along x.
     dimer
-        The first walkers, to which Γ0 refers; None if they are no dimers.
+        The first walkers, to which Γ0 refers; None if they are not dimers.
     notes
         Get the sources of the axes and the peak accelerations.
 
@@ -66,11 +71,22 @@ def _axis_and_peak(
     dimer: Dimer | None,
     notes: Notes,
 ) -> dict[str, Any]:
-    """Values of ``axis`` and ``peak_acceleration`` (m/s²) of the table at a dotted key."""
-    axis, peak = sine.axis, sine.peak_acceleration
+    """Values of ``axis`` and ``peak_acceleration`` (m/s²) of an oscillation.
+
+    Parameters
+    ----------
+    sine
+        Its table.
+    key
+        Dotted key of the table.
+    boundary, dimer, notes
+        As for `drive_of`.
+    """
+    axis = sine.axis
     if axis is None:
         axis = "z" if boundary.closed else "x"
         notes.add(f"{key}.axis", f"of a {boundary.shape}", "default")
+    peak = sine.peak_acceleration
     if sine.gamma0 is not None:
         if dimer is None:
             raise key_error(f"{key}.gamma0", "expected peak_acceleration: only a dimer has a Γ0")
@@ -85,24 +101,22 @@ def _check_harmonics(drive: Drive) -> None:
     try:
         common_frequency([harmonic.frequency for harmonic in excitation.harmonics])
     except ValueError as error:
-        raise key_error(
-            "drive.harmonics", f"expected frequencies with a common period: {error}"
-        ) from error
+        message = f"expected frequencies with a common period: {error}"
+        raise key_error("drive.harmonics", message) from error
     if drive.frame == "lab" and not excitation.is_plain:
         message = "several harmonics, or one with a phase, are driven in the container's frame"
         raise key_error("drive.frame", f'expected "container": {message}')
 
 
 def _recorded_drive(table: DriveTable, notes: Notes) -> Drive:
-    """The drive by a record, with notes of its frequency and peak acceleration."""
+    """The drive of a record, with notes of its frequency and peak acceleration."""
     drive = table.completed(Drive, {})
     excitation = drive.excitation
     record = present(excitation.record, "drive.record")
-    first, last = (record.rows[end][1:] for end in (0, -1))
-    if record.repeats and dist(first, last) > _MEET * record.largest(2):
-        raise key_error(
-            "drive.repeats", "expected a record that ends with the first row of the next period"
-        )
+    mismatch = dist(record.rows[0][1:], record.rows[-1][1:])
+    if record.repeats and mismatch > _LARGEST_MISMATCH * record.largest(2):
+        message = "expected a record that ends with the first row of the next period"
+        raise key_error("drive.repeats", message)
     check_drive(excitation)
     why = "all lines are multiples" if record.repeats else "the strongest line"
     frequency = f"{excitation.frequency:.6g} Hz"

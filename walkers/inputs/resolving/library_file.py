@@ -1,4 +1,7 @@
-"""The tables of a library file. Their models take time to build: only readers of such files import this."""
+"""The tables of a library file, which check what its user has written.
+
+Their models take time to build: only what reads such files imports this module.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ Q = TypeVar("Q")
 
 
 def _printable(text: str) -> str:
+    """The text; raises `ValueError` if it is empty, or cannot be printed on one line."""
     if not text or not text.isprintable():
         raise ValueError("expected printable text on one line")
     return text
@@ -24,7 +28,10 @@ Text = Annotated[str, AfterValidator(_printable)]
 
 
 class Sourced(ConfigTable, Generic[Q]):
-    """``{ value = …, source = "…" }``: a number of a library, and both ends of where it can lie if it is uncertain."""
+    """A number of a library: ``{ value = …, source = "…" }``.
+
+    ``range`` has the lower and the upper end between which an uncertain number can lie.
+    """
 
     value: Q
     source: Text = Field(examples=["weighed"])
@@ -32,18 +39,26 @@ class Sourced(ConfigTable, Generic[Q]):
 
     @field_validator("range")
     @classmethod
-    def _has_the_value(
-        cls, ends: tuple[Any, Any] | None, of: ValidationInfo
+    def _contains_the_value(
+        cls, ends: tuple[Any, Any] | None, validation: ValidationInfo
     ) -> tuple[Any, Any] | None:
-        if ends is not None and not ends[0] < ends[1]:
+        """The ends; raises `ValueError` unless they are in order, with the value between them."""
+        if ends is None:
+            return None
+        low, high = ends
+        if not low < high:
             raise ValueError("expected the lower end first: [low, high]")
-        if ends is not None and "value" in of.data and not ends[0] <= of.data["value"] <= ends[1]:
+        value = validation.data.get("value")  # missing if it is wrong itself
+        if value is not None and not low <= value <= high:
             raise ValueError("expected two ends with the value between them")
         return ends
 
 
 class MaterialTable(ConfigTable):
-    """``[materials."NAME"]``; the modulus of contacts is not this one but the case's ``contact.youngs_modulus``."""
+    """``[materials."NAME"]``.
+
+    Its modulus is that of the material; that of contacts is ``contact.youngs_modulus`` of the case.
+    """
 
     density: Sourced[units.Density]
     youngs_modulus: Sourced[Annotated[float, units.MODULUS]] | None = None
@@ -52,7 +67,7 @@ class MaterialTable(ConfigTable):
 
 
 class LibraryLiquidTable(ConfigTable):
-    """``[liquids."NAME"]``, with one of the two viscosities."""
+    """``[liquids."NAME"]``, with either of the two viscosities."""
 
     surface_tension: Sourced[units.SurfaceTension]
     density: Sourced[units.Density]
@@ -61,6 +76,7 @@ class LibraryLiquidTable(ConfigTable):
 
     @model_validator(mode="after")
     def _has_a_viscosity(self) -> LibraryLiquidTable:
+        """The table; raises `ValueError` unless it has one viscosity."""
         if (self.kinematic_viscosity is None) == (self.dynamic_viscosity is None):
             raise ValueError("expected either kinematic_viscosity or dynamic_viscosity")
         return self

@@ -8,11 +8,29 @@ from walkers.inputs.origins import Source, SourceKind
 
 
 class Notes:
-    """Sources of the values that a file does not give, by their keys."""
+    """Sources of the values that a file does not give.
+
+    Attributes
+    ----------
+    sources : dict of str to Source
+        The sources by their keys.
+    """
 
     def __init__(self, sources: Mapping[str, Source]) -> None:
         self.sources = dict(sources)
 
     def add(self, name: str, why: str, origin: SourceKind = "derived", text: str = "") -> None:
-        """Note why a key has its value; ``text`` is the value in words."""
+        """Note where the value of a key is from.
+
+        Parameters
+        ----------
+        name
+            Dotted key.
+        why
+            The source in words.
+        origin
+            Kind of the source.
+        text
+            The value in words; empty if it is a number.
+        """
         self.sources[name] = Source(origin, why, text)
