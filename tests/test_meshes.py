@@ -400,7 +400,7 @@ def steps_between_faces(vessel: Vessel) -> list[float]:
     for facet in vessel.facets:
         if facet.kind == "face":
             corners = np.array([point for cell in facet.cells for point, _, _ in cell])
-            steps.append(float(np.abs((corners - facet.point) @ facet.along).max()))
+            steps.append(float(np.abs((corners - facet.point) @ facet.direction).max()))
     return steps
 
 

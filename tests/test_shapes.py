@@ -14,7 +14,7 @@ import pytest
 
 from walkers.arrays import FloatArray
 from walkers.errors import InputError
-from walkers.inputs.meshes.facet import Facet
+from walkers.inputs.meshes.facet import Facet, HalfSpace
 from walkers.inputs.reading import load_case
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.shapes import walls
@@ -25,8 +25,8 @@ from walkers.inputs.tables.shapes.walls import Flat, Round, Wall
 PACKAGE = Path(walls.__file__).parents[3]
 KINDS = {"Flat", "Round", "Facet"}
 _STRIP = (
-    ((2e-3, 0.0, 0.0), (-1.0, 0.0, 0.0), -1e-12),
-    ((-2e-3, 0.0, 0.0), (1.0, 0.0, 0.0), -1e-12),
+    HalfSpace((2e-3, 0.0, 0.0), (-1.0, 0.0, 0.0), -1e-12),
+    HalfSpace((-2e-3, 0.0, 0.0), (1.0, 0.0, 0.0), -1e-12),
 )
 WALLS: dict[str, Wall] = {
     "plane": Flat((1e-4, 2e-4, -3e-4), (0.48, -0.36, 0.8), "leaning"),

@@ -1,1 +1,1 @@
-"""Vessels of the user's own: mesh files, the inner surface of a vessel, its faces, edges and corners."""
+"""Vessels of the user's own: mesh files, the inner surface of a vessel, its faces and edges."""

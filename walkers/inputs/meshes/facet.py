@@ -9,9 +9,24 @@ import numpy as np
 
 from walkers.arrays import FloatArray, Vector
 
-Half = tuple[Vector, Vector, float]
-"""A point, a direction and a bound: a place is in it if its offset from the point along the
-direction is above the bound."""
+
+class HalfSpace(NamedTuple):
+    """The places whose offset from a point along a direction is above a bound.
+
+    Attributes
+    ----------
+    point
+        The point, m.
+    direction
+        The direction, a vector of any length.
+    bound
+        The bound of the scalar product of offset and direction, in m times the length of the
+        direction.
+    """
+
+    point: Vector
+    direction: Vector
+    bound: float
 
 
 def numbers_text(*values: float) -> str:
@@ -20,56 +35,84 @@ def numbers_text(*values: float) -> str:
 
 
 class Facet(NamedTuple):
-    """A part of a surface: ``face``, ``edge`` or ``corner``.
+    """A part of a surface: a face, an edge or a corner.
 
-    ``point`` is in it (m); ``along`` is the normal of a face, toward the beads, the direction of an
-    edge, zero of a corner. The nearest point of the surface is in it for beads that are in one of
-    the ``cells``.
+    Attributes
+    ----------
+    kind
+        ``face``, ``edge`` or ``corner``.
+    point
+        A point of it, m.
+    direction
+        The normal of a face, toward the beads; the direction of an edge; zero of a corner.
+    cells
+        Groups of half-spaces. The facet has the nearest point of the surface for the beads that
+        are in all half-spaces of one of the cells.
+    name
+        Its name in messages and tables.
     """
 
     kind: str
     point: Vector
-    along: Vector
-    cells: tuple[tuple[Half, ...], ...]
+    direction: Vector
+    cells: tuple[tuple[HalfSpace, ...], ...]
     name: str
 
-    def away(self, places: FloatArray) -> FloatArray:
-        """Offset of places from its plane, line or corner, shape (..., 3), m."""
-        away, along = places - self.point, np.array(self.along)
-        over: FloatArray = (away @ along)[..., None] * along
-        return over if self.kind == "face" else away - over
+    def offsets(self, places: FloatArray) -> FloatArray:
+        """Offsets of places from the plane, line or corner of the facet, shape (..., 3), m."""
+        from_point = places - self.point
+        direction = np.array(self.direction)
+        parallel: FloatArray = (from_point @ direction)[..., None] * direction
+        if self.kind == "face":
+            return parallel
+        return from_point - parallel
 
     def distances(self, places: FloatArray) -> FloatArray:
-        """Of places, shape (..., 3), m; infinite where another part of the surface is nearer."""
+        """Distances of places from the facet.
+
+        Parameters
+        ----------
+        places : ndarray, shape (..., 3)
+            Places, m.
+
+        Returns
+        -------
+        ndarray, shape (...)
+            Distances in m; infinite where another facet of the surface is nearer.
+        """
         within = np.zeros(places.shape[:-1], dtype=bool)
         for cell in self.cells:
-            points, directions, bounds = (np.array(column) for column in zip(*cell, strict=True))
+            points = np.array([half_space.point for half_space in cell])
+            directions = np.array([half_space.direction for half_space in cell])
+            bounds = np.array([half_space.bound for half_space in cell])
             offsets = np.einsum("...hx,hx->...h", places[..., None, :] - points, directions)
             within |= np.all(offsets > bounds, axis=-1)
         if self.kind == "face":
-            within &= (places - self.point) @ np.array(self.along) > 0.0
-        return np.where(within, np.linalg.norm(self.away(places), axis=-1), inf)
+            within &= (places - self.point) @ np.array(self.direction) > 0.0
+        return np.where(within, np.linalg.norm(self.offsets(places), axis=-1), inf)
 
     def normals(self, places: FloatArray) -> FloatArray:
-        """Unit vectors away from it, of the shape of the places."""
-        away = self.away(places)
-        return np.asarray(away / np.linalg.norm(away, axis=-1, keepdims=True))
+        """Unit vectors from the facet to places, of the shape of the places."""
+        offsets = self.offsets(places)
+        return np.asarray(offsets / np.linalg.norm(offsets, axis=-1, keepdims=True))
 
     def nearest_points(self, places: FloatArray) -> FloatArray:
         """Points of its plane, line or corner that are nearest to places, shape (..., 3), m."""
-        return places - self.away(places)
+        return places - self.offsets(places)
 
     def deck_words(self) -> str:
-        """Empty: the facet stands in the file of facets."""
+        """Nothing: the facet stands in the file of facets."""
         return ""
 
     def file_rows(self) -> str:
         """Its line of the file of facets, and one for each cell."""
-        place = f"{numbers_text(*self.point)}  {numbers_text(*self.along)}"
+        place = f"{numbers_text(*self.point)}  {numbers_text(*self.direction)}"
         lines = [f"{self.kind} {place}  {len(self.cells)}\n"]
         for cell in self.cells:
-            halves = [numbers_text(*point, *direction, bound) for point, direction, bound in cell]
-            lines.append(f"{len(cell)}  {'  '.join(halves)}\n")
+            texts = []
+            for point, direction, bound in cell:
+                texts.append(numbers_text(*point, *direction, bound))
+            lines.append(f"{len(cell)}  {'  '.join(texts)}\n")
         return "".join(lines)
 
     def tangent_planes(self) -> tuple[FloatArray, FloatArray]:
@@ -77,4 +120,4 @@ class Facet(NamedTuple):
         return np.empty((0, 3)), np.empty((0, 3))
 
     def kernel_row(self) -> None:
-        """None: the second engine knows no facets."""
+        """None: the second engine does not know facets."""

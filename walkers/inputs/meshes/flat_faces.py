@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,84 +12,126 @@ from walkers.arrays import FloatArray, IntArray
 LEAST_STEP = 1e-9
 """Distance from the plane of a face within which all of its corners are, m.
 
-Beads overlap with walls by some 0.1 µm at rest, so a step of 1 nm between two faces is no obstacle. A limit of
-angles would not do: planes of a finely meshed curve would leave it by micrometres."""
-_ROUNDING = 6e-8  # of the extent of a surface: rounding of corners in single precision
-_FITS = 20  # planes that are fitted to a growing face at most
+Beads overlap with walls by some 0.1 µm at rest, so a step of 1 nm between two faces is no
+obstacle. A limit of angles would not do: planes of a finely meshed curve would leave it by
+micrometres."""
+_ROUNDING = 6e-8
+"""Rounding of corners in single precision, over the extent of a surface."""
+_MOST_FITS = 20
+"""Largest number of planes that are fitted to a growing face."""
+
+
+class Plane(NamedTuple):
+    """The plane of a face: a point (m), and its unit normal toward the beads, shape (3,) each."""
+
+    point: FloatArray
+    normal: FloatArray
 
 
 class FlatFaces:
-    """Triangles of a surface, joined to faces that are flat."""
+    """Triangles of a surface, joined to faces that are flat.
+
+    Parameters
+    ----------
+    points : ndarray, shape (P, 3)
+        Corners of the triangles, m.
+    triangles : ndarray, shape (T, 3)
+        Numbers of the corners of each triangle.
+    area_vectors : ndarray, shape (T, 3)
+        Normals of the triangles, toward the beads, as long as twice their areas, m².
+    neighbours : ndarray, shape (E, 2)
+        Pairs of triangles with an edge in common.
+    """
 
     def __init__(
-        self, points: FloatArray, triangles: IntArray, spans: FloatArray, neighbours: IntArray
+        self,
+        points: FloatArray,
+        triangles: IntArray,
+        area_vectors: FloatArray,
+        neighbours: IntArray,
     ) -> None:
-        """Of points (m), triangles, their normals of the length of twice their areas, and pairs with an edge."""
         self.points = points
         self.triangles = triangles
-        self.areas = np.linalg.norm(spans, axis=1) / 2.0
-        self.normals = spans / (2.0 * self.areas[:, None])
+        self.areas = np.linalg.norm(area_vectors, axis=1) / 2.0
+        self.normals = area_vectors / (2.0 * self.areas[:, None])
         self.limit = max(LEAST_STEP, _ROUNDING * float(np.ptp(points, axis=0).max()))
-        self.places = points.tolist()
-        self.corners = triangles.tolist()
-        self.normal_lists = self.normals.tolist()
-        self.faces = np.full(len(self.corners), -1)
-        self.beside: dict[int, list[int]] = defaultdict(list)
+        # Lists of numbers are faster than arrays where triangles are looked at one by one.
+        self.point_list = points.tolist()
+        self.corner_lists = triangles.tolist()
+        self.normal_list = self.normals.tolist()
+        self.faces = np.full(len(self.corner_lists), -1)
+        self.neighbours_of: dict[int, list[int]] = defaultdict(list)
         for first, second in neighbours.tolist():
-            self.beside[first].append(second)
-            self.beside[second].append(first)
+            self.neighbours_of[first].append(second)
+            self.neighbours_of[second].append(first)
 
-    def grown(self) -> tuple[IntArray, dict[int, tuple[FloatArray, FloatArray]]]:
-        """Face of each triangle, and the planes of the faces. They grow from the largest triangles on."""
+    def grown(self) -> tuple[IntArray, dict[int, Plane]]:
+        """Let faces grow, from the largest triangles on.
+
+        Returns
+        -------
+        faces : ndarray, shape (T,)
+            Number of the face of each triangle: that of the largest triangle in it.
+        planes : dict of int to Plane
+            Planes of the faces by their numbers.
+        """
         planes = {}
         for seed in np.argsort(-self.areas, kind="stable").tolist():
             if self.faces[seed] >= 0:
                 continue
-            point = self.points[self.corners[seed][0]]
-            normal = self.normals[seed]
-            members = self._connected(seed, point, normal)
-            for _ in range(_FITS):
+            plane = Plane(self.points[self.corner_lists[seed][0]], self.normals[seed])
+            members = self._connected(seed, plane)
+            for _ in range(_MOST_FITS):
                 if len(members) == 1:
                     break
-                fitted = self._fitted(members, normal)
-                more = self._connected(seed, *fitted)
-                if len(more) <= len(members):
+                # The plane of all members is more exact than that of the first triangle.
+                fitted_plane = self._fitted_plane(members, plane.normal)
+                more_members = self._connected(seed, fitted_plane)
+                if len(more_members) <= len(members):
                     break
-                members = more
-                point, normal = fitted
+                members = more_members
+                plane = fitted_plane
             self.faces[members] = seed
-            planes[seed] = (point, normal)
+            planes[seed] = plane
         return self.faces, planes
 
-    def _fitted(self, members: list[int], toward: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """A point and the normal of the plane that is nearest to the corners of triangles."""
+    def _fitted_plane(self, members: list[int], toward: FloatArray) -> Plane:
+        """The plane that is nearest to the corners of triangles, with a normal toward a
+        direction.
+        """
         corners = self.points[np.unique(self.triangles[members])]
         middle = corners.mean(axis=0)
         normal = np.linalg.svd(corners - middle, full_matrices=False)[2][2]
-        return middle, normal if normal @ toward > 0.0 else -normal
+        return Plane(middle, normal if normal @ toward > 0.0 else -normal)
 
-    def _connected(self, seed: int, point: FloatArray, normal: FloatArray) -> list[int]:
-        """Triangles in a plane, and of no face yet, that are connected with one of them; none if that is not in it."""
-        through, along = point.tolist(), normal.tolist()
-        if not self._is_in(seed, through, along):
+    def _connected(self, seed: int, plane: Plane) -> list[int]:
+        """Triangles in a plane, and of no face yet, that are connected with one of them.
+
+        There are none if the triangle ``seed`` itself is not in the plane.
+        """
+        point = plane.point.tolist()
+        normal = plane.normal.tolist()
+        if not self._is_in(seed, point, normal):
             return []
         members = {seed}
         waiting = [seed]
         while waiting:
-            for neighbour in self.beside[waiting.pop()]:
+            for neighbour in self.neighbours_of[waiting.pop()]:
                 if neighbour in members or self.faces[neighbour] >= 0:
                     continue
-                if self._is_in(neighbour, through, along):
+                if self._is_in(neighbour, point, normal):
                     members.add(neighbour)
                     waiting.append(neighbour)
         return sorted(members)
 
     def _is_in(self, triangle: int, point: list[float], normal: list[float]) -> bool:
         """Whether all corners of a triangle are in a plane, and its normal is not turned over."""
-        (x, y, z), (a, b, c) = point, normal
-        for corner in self.corners[triangle]:
-            px, py, pz = self.places[corner]
-            if abs((px - x) * a + (py - y) * b + (pz - z) * c) > self.limit:
+        x, y, z = point
+        a, b, c = normal
+        for corner in self.corner_lists[triangle]:
+            corner_x, corner_y, corner_z = self.point_list[corner]
+            offset = (corner_x - x) * a + (corner_y - y) * b + (corner_z - z) * c
+            if abs(offset) > self.limit:
                 return False
-        triangle_normal = self.normal_lists[triangle]
-        return bool(triangle_normal[0] * a + triangle_normal[1] * b + triangle_normal[2] * c > 0.0)
+        triangle_a, triangle_b, triangle_c = self.normal_list[triangle]
+        return bool(triangle_a * a + triangle_b * b + triangle_c * c > 0.0)
