@@ -1,10 +1,10 @@
 """Read one mesh file in a process of its own: ``python -m walkers.inputs.meshes.mesh_reader FILE``.
 
-Libraries that read meshes end the process, or ask for all memory, where a file is damaged or made to
-do harm. So `walkers.inputs.meshes.mesh_file` starts this module with limits of time and memory. The
-module writes the points and triangles to standard output as an npz file, or the reason why there are
-none as text, with exit status `REFUSED` or `READ_NOTHING`. Of this project it imports the types of
-arrays alone, so that it starts quickly.
+Libraries that read meshes end the process, or ask for all memory, where a file is damaged or made
+to do harm. So `walkers.inputs.meshes.mesh_file` starts this module with limits of time and
+memory. The module writes the points and triangles to standard output as an npz file, or the
+reason why there are none as text, with exit status `REFUSED` or `READ_NOTHING`. Of this project
+it imports the types of arrays alone, so that it starts quickly.
 """
 
 from __future__ import annotations
@@ -26,17 +26,19 @@ from walkers.arrays import FloatArray
 
 Polygons = list[npt.NDArray[np.int64]]
 """Corners of polygons: arrays of shape (polygons, corners), one for each number of corners."""
-
 REFUSED = 3
-"""Exit status where the file is no mesh that can be read."""
+"""Exit status if the file is not a mesh that can be read."""
 READ_NOTHING = 4
-"""Exit status where a reader gives no surface: what it has printed says more than the text of this module."""
-MOST_BYTES = 3 << 30
+"""Exit status if a reader gives no surface: what it has printed says more than the text of this
+module."""
+MOST_MEMORY = 3 << 30
 """Address space that reading may take, bytes."""
 MOST_SECONDS = 60
 """CPU time that reading may take, s."""
-_MOST_ITEMS = 3_000_000  # points, cells or values that a file may announce
-_LEAST_DETAIL = 1e-5  # of the extent of a mesh: what single precision must resolve
+_MOST_ITEMS = 3_000_000
+"""Largest number of points, cells or values that a file may announce."""
+_LEAST_DETAIL = 1e-5
+"""Length that single precision must resolve, over the extent of a mesh."""
 
 _VTK_READERS = {
     ".stl": ("vtkIOGeometry", "vtkSTLReader"),
@@ -46,6 +48,7 @@ _VTK_READERS = {
     ".vtu": ("vtkIOXML", "vtkXMLUnstructuredGridReader"),
     ".vtk": ("vtkIOLegacy", "vtkGenericDataObjectReader"),
 }
+"""Modules and names of VTK's readers by the endings of files."""
 _CORNERS_OF_VTK_CELLS = {
     5: (0, 1, 2),
     8: (0, 1, 3, 2),  # a pixel, whose corners are in rows
@@ -55,8 +58,12 @@ _CORNERS_OF_VTK_CELLS = {
     28: (0, 1, 2, 3),
     34: (0, 1, 2),
 }
+"""Places of the corners, counterclockwise, among the points of flat cells, by VTK's numbers of
+cell types."""
 _VTK_POLYGON = 7
+"""VTK's number of the cell type of polygons."""
 _CORNERS_OF_MESHIO_CELLS = {"triangle": 3, "quad": 4}
+"""Numbers of corners of flat cells by meshio's names, without the number of points."""
 
 
 class NothingRead(ValueError):
@@ -79,9 +86,10 @@ def _points_of(dataset: Any) -> FloatArray:
 
 
 def shortest_decimals(points: npt.NDArray[Any]) -> FloatArray:
-    """The points in double precision; those of single precision by the fewest digits that name them.
+    """Points in double precision.
 
-    So 2.65 of a binary STL file is 2.65 and not 2.6500000953674316.
+    Numbers of single precision are read as the shortest decimals that name them: 2.65 of a binary
+    STL file is 2.65 and not 2.6500000953674316.
     """
     if points.dtype.itemsize >= 8:
         return points.astype(np.float64)
@@ -122,7 +130,7 @@ def _check_precision(path: Path, points: FloatArray) -> None:
 
 
 def _check_indices(groups: Iterable[npt.NDArray[np.int64]], count: int) -> None:
-    """Refuse polygons of points that the file does not have."""
+    """Refuse polygons whose corners are not among the points, of which there are ``count``."""
     for group in groups:
         wrong = group[(group < 0) | (group >= count)]
         if wrong.size:
@@ -144,9 +152,9 @@ def _triangles_of_polygons(points: FloatArray, polygons: Polygons) -> npt.NDArra
     offsets = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
     corners = np.concatenate([group.ravel() for group in polygons]).astype(np.int64)
     cells = vtkCellArray()
-    cells.SetData(
-        support.numpy_to_vtkIdTypeArray(offsets, 1), support.numpy_to_vtkIdTypeArray(corners, 1)
-    )
+    vtk_offsets = support.numpy_to_vtkIdTypeArray(offsets, 1)
+    vtk_corners = support.numpy_to_vtkIdTypeArray(corners, 1)
+    cells.SetData(vtk_offsets, vtk_corners)
     places = vtkPoints()
     places.SetData(support.numpy_to_vtk(np.ascontiguousarray(points), 1))
     surface = vtkPolyData()
@@ -164,18 +172,21 @@ def _polygons_of_grid(grid: Any) -> Polygons:
     offsets = vtk_to_numpy(grid.GetCells().GetOffsetsArray())
     corners = vtk_to_numpy(grid.GetCells().GetConnectivityArray())
     polygons: Polygons = []
-    for number, kind in enumerate(vtk_to_numpy(grid.GetCellTypes())):
+    for number, cell_type in enumerate(vtk_to_numpy(grid.GetCellTypes())):
         cell = corners[offsets[number] : offsets[number + 1]]
-        if kind == _VTK_POLYGON:
+        if cell_type == _VTK_POLYGON:
             polygons.append(cell[None].astype(np.int64))
-        elif kind in _CORNERS_OF_VTK_CELLS:
-            order = list(_CORNERS_OF_VTK_CELLS[kind])
+        elif cell_type in _CORNERS_OF_VTK_CELLS:
+            order = list(_CORNERS_OF_VTK_CELLS[cell_type])
             polygons.append(cell[order][None].astype(np.int64))
     return polygons
 
 
 def _check_announced_sizes(path: Path) -> None:
-    """Refuse XML files of VTK that announce more data than a vessel has, before VTK makes room for it."""
+    """Refuse XML files of VTK that announce more data than a vessel has.
+
+    VTK would ask for the memory before it reads the data.
+    """
     text = path.read_bytes()
     for name, digits in re.findall(rb'\b(Number\w*)\s*=\s*["\']\s*(\d+)', text):
         if int(digits) > _MOST_ITEMS:
@@ -184,12 +195,14 @@ def _check_announced_sizes(path: Path) -> None:
 
 
 def _read_by_vtk(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    module, name = _VTK_READERS[path.suffix.lower()]
-    if path.suffix.lower() in (".vtp", ".vtu"):
+    """Points and triangles of a file of one of the formats in `_VTK_READERS`."""
+    ending = path.suffix.lower()
+    if ending in (".vtp", ".vtu"):
         _check_announced_sizes(path)
+    module, name = _VTK_READERS[ending]
     reader = getattr(import_module(f"vtkmodules.{module}"), name)()
     reader.SetFileName(str(path))
-    if path.suffix.lower() == ".stl":
+    if ending == ".stl":
         reader.MergingOff()
     reader.Update()
     dataset = reader.GetOutput()
@@ -220,13 +233,18 @@ def _read_off(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     lines = _lines_of_off(path)
     if not lines or not lines[0][0].endswith("OFF"):
         raise ValueError("it does not begin with OFF")
-    counts = lines[0][1:] or lines[1]
-    rest = lines[1:] if lines[0][1:] else lines[2:]
-    point_count, face_count = int(counts[0]), int(counts[1])
+    if lines[0][1:]:
+        counts = lines[0][1:]
+        rest = lines[1:]
+    else:
+        counts = lines[1]
+        rest = lines[2:]
+    point_count = int(counts[0])
+    face_count = int(counts[1])
     if len(rest) < point_count + face_count:
         announced = f"{point_count} points and {face_count} faces"
         raise ValueError(f"it announces {announced}, and has {len(rest)} lines of them")
-    points = np.array([[float(word) for word in words[:3]] for words in rest[:point_count]])
+    points = np.array([_coordinates(words) for words in rest[:point_count]])
     polygons: Polygons = []
     for words in rest[point_count : point_count + face_count]:
         corners = words[1 : 1 + int(words[0])]
@@ -234,20 +252,25 @@ def _read_off(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     return points, _triangles_of_polygons(points.reshape(-1, 3), polygons)
 
 
+def _coordinates(words: Sequence[str]) -> list[float]:
+    """The coordinates of a point of an OFF file, after which colours may follow."""
+    return [float(word) for word in words[:3]]
+
+
 def _check_other_files(path: Path) -> None:
     """Refuse files whose points are in other files, which may be any on this machine."""
     if path.suffix.lower() in (".xdmf", ".xmf"):
         text = path.read_text(encoding="utf-8", errors="replace")
-        for kind in re.findall(r'Format\s*=\s*["\'](\w+)', text):
-            if kind.upper() != "XML":
-                raise ValueError(
-                    f'its data are in another file (Format="{kind}"); write them into it'
-                )
+        for name in re.findall(r'Format\s*=\s*["\'](\w+)', text):
+            if name.upper() != "XML":
+                problem = f'its data are in another file (Format="{name}")'
+                raise ValueError(f"{problem}; write them into it")
     if path.suffix.lower() == ".inp" and re.search(rb"(?im)^\s*\*\s*include", path.read_bytes()):
         raise ValueError("it includes another file; write all into one")
 
 
 def _read_by_meshio(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+    """Points and triangles of a file of a format of meshio."""
     import meshio
 
     _check_other_files(path)
@@ -257,11 +280,12 @@ def _read_by_meshio(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     points = shortest_decimals(np.pad(given, ((0, 0), (0, 3 - given.shape[1]))))
     polygons: Polygons = []
     for block in mesh.cells:
-        count = _CORNERS_OF_MESHIO_CELLS.get(block.type.rstrip("0123456789"), 0)
+        name = block.type.rstrip("0123456789")  # such as triangle of triangle6
         if block.type == "polygon":
             polygons += [np.array([corners], dtype=np.int64) for corners in block.data]
-        elif count:
-            polygons.append(np.array(block.data, dtype=np.int64)[:, :count])
+        elif name in _CORNERS_OF_MESHIO_CELLS:
+            corner_count = _CORNERS_OF_MESHIO_CELLS[name]
+            polygons.append(np.array(block.data, dtype=np.int64)[:, :corner_count])
     return points, _triangles_of_polygons(points, polygons)
 
 
@@ -295,35 +319,41 @@ def read_surface(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     _check_indices([triangles], len(points))
     bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
     if bad.size:
-        place = ", ".join(f"{x:g}" for x in points[bad[0]])
+        place = ", ".join(f"{coordinate:g}" for coordinate in points[bad[0]])
         raise ValueError(f"point {bad[0] + 1} is ({place}), which is no place")
     return points, triangles
 
 
-def _limit(kind: int, most: int) -> None:
-    """Lower a limit of this process."""
-    _, hard = resource.getrlimit(kind)
+def _set_limit(limit: int, value: int) -> None:
+    """Lower a limit of this process, such as ``resource.RLIMIT_CPU``."""
+    _, hard = resource.getrlimit(limit)
     if hard != resource.RLIM_INFINITY:
-        most = min(most, hard)
-    resource.setrlimit(kind, (most, hard))
+        value = min(value, hard)
+    resource.setrlimit(limit, (value, hard))
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Read the file of the only argument; see the module."""
-    _limit(resource.RLIMIT_AS, MOST_BYTES)
-    _limit(resource.RLIMIT_CPU, MOST_SECONDS)
-    _limit(resource.RLIMIT_CORE, 0)
+    """Read the file that the only argument names, and write its surface to standard output.
+
+    Returns
+    -------
+    int
+        The exit status: 0, `REFUSED` or `READ_NOTHING`.
+    """
+    _set_limit(resource.RLIMIT_AS, MOST_MEMORY)
+    _set_limit(resource.RLIMIT_CPU, MOST_SECONDS)
+    _set_limit(resource.RLIMIT_CORE, 0)
     try:
         points, triangles = read_surface(Path(arguments[0]))
     except MemoryError:
-        sys.stdout.write(f"it takes more than {MOST_BYTES >> 30} GB to read")
+        sys.stdout.write(f"it takes more than {MOST_MEMORY >> 30} GB to read")
         return REFUSED
-    except (
-        Exception,
-        SystemExit,
-    ) as error:  # meshio ends the process where a file is not of its format
+    except (NothingRead, SystemExit) as error:  # meshio ends the process if it cannot read a file
         sys.stdout.write(str(error))
-        return READ_NOTHING if isinstance(error, (NothingRead, SystemExit)) else REFUSED
+        return READ_NOTHING
+    except Exception as error:
+        sys.stdout.write(str(error))
+        return REFUSED
     arrays = BytesIO()
     np.savez(arrays, points=points, triangles=triangles)
     sys.stdout.buffer.write(arrays.getvalue())
