@@ -1,3 +1,1 @@
-"""What follows from a case file: values of the library, defaults, loads of contacts, and where
-beads start.
-"""
+"""What follows from a case file: library values, defaults, loads of contacts, where beads start."""
