@@ -20,6 +20,7 @@ from walkers.errors import InputError, key_error
 from walkers.inputs.meshes.crossings import first_crossing, first_fold
 from walkers.inputs.meshes.triangles import SAME_POINT, merged
 from walkers.inputs.meshes.vessel import Vessel
+from walkers.inputs.meshes.wall_names import axis_name
 
 _ONE_OPENING = "one, at its top: close the others"
 """What messages about several openings expect."""
@@ -200,7 +201,7 @@ def _check_opening(vessel: Vessel) -> None:
     middle = rim.mean(axis=0)
     facing = vessel.facing
     if facing[2] < cos(_STEEPEST_OPENING):
-        problem = f"has an opening that faces {_axis_text(facing)},"
+        problem = f"has an opening that faces {axis_name(facing)},"
         expected = "one that faces +z, which is up: rotate the mesh, or close a hole in its side"
         raise _mesh_error(problem, middle, expected)
     heights = (rim - middle) @ facing
@@ -208,13 +209,6 @@ def _check_opening(vessel: Vessel) -> None:
         problem = f"has a rim that dips by {1e3 * np.ptp(heights):.3g} mm,"
         expected = "a rim about in one plane: close slots in the walls"
         raise _mesh_error(problem, rim[heights.argmin()], expected)
-
-
-def _axis_text(direction: FloatArray) -> str:
-    """The axis that is nearest to a direction, with its sign, such as ``-x``."""
-    axis = int(np.abs(direction).argmax())
-    sign = "+" if direction[axis] > 0.0 else "-"
-    return f"{sign}{'xyz'[axis]}"
 
 
 # --- parts --------------------------------------------------------------------------------------
@@ -428,9 +422,8 @@ def _basin(solid: Vessel, points: frozenset[int], level: float) -> _Basin:
 
     Its volume is negative if the piece encloses the solid, and 0 if it is flat.
     """
-    low = frozenset(
-        point for point in points if solid.points[point, 2] < level - _same_point_distance(solid)
-    )
+    slack = _same_point_distance(solid)
+    low = frozenset(point for point in points if solid.points[point, 2] < level - slack)
     if not low:
         return _Basin(low, level, 0.0, 0.0)
     piece = Vessel(solid.points, solid.triangles[np.isin(solid.triangles, list(low)).any(axis=1)])

@@ -11,6 +11,7 @@ from walkers.arrays import FloatArray, IntArray, Vector
 from walkers.errors import key_error
 from walkers.inputs.meshes.triangles import merged
 from walkers.inputs.meshes.vessel import Vessel
+from walkers.inputs.meshes.wall_names import axis_name
 
 _MOST_EXTENT = 1e3
 """Extent of a vessel over its height from which it counts as open to a side."""
@@ -99,10 +100,8 @@ def _check_closed(corners: FloatArray, far: float) -> None:
     if np.abs(corners).max() <= 0.999 * far:
         return
     farthest = corners[np.abs(corners).max(axis=1).argmax()]
-    axis = int(abs(farthest).argmax())
-    sign = "+" if farthest[axis] > 0.0 else "-"
-    message = f"are open toward {sign}{'xyz'[axis]}; expected planes that close the vessel"
-    raise key_error("boundary.planes", message)
+    problem = f"are open toward {axis_name(farthest)}"
+    raise key_error("boundary.planes", f"{problem}; expected planes that close the vessel")
 
 
 def _in_order(numbers: IntArray, corners: FloatArray, normal: FloatArray) -> IntArray:

@@ -1,4 +1,7 @@
-"""Names of the walls of a vessel: by the side where they are, and their height."""
+"""Names of the walls of a vessel: by the side where they are, and their height.
+
+Names of walls of shapes that the program knows are in `walkers.inputs.tables.shapes`.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,9 @@ from collections import Counter
 from collections.abc import Sequence
 from math import acos, atan2, degrees
 
-from walkers.arrays import Vector
+import numpy as np
+
+from walkers.arrays import FloatArray, Vector
 
 FLOOR_NAME = "floor"
 """Name of a level face at the lowest point."""
@@ -63,6 +68,13 @@ def _side(normal: Vector) -> str:
     if slope == 90.0:
         return side
     return f"{side} slope {slope:g}°"
+
+
+def axis_name(direction: FloatArray) -> str:
+    """The axis that is nearest to a direction, with its sign, such as ``-x``."""
+    axis = int(np.abs(direction).argmax())
+    sign = "+" if direction[axis] > 0.0 else "-"
+    return f"{sign}{'xyz'[axis]}"
 
 
 def span_text(heights: Sequence[float]) -> str:

@@ -126,7 +126,9 @@ def mixture_draft(table: MixtureTable, notes: Notes) -> MixtureDraft:
 
 def placed_bead(table: PlacedBeadTable) -> PlacedBead:
     """A placed bead with its radius."""
-    radius = table.radius if table.diameter is None else table.diameter / 2.0
+    radius = table.radius
+    if table.diameter is not None:
+        radius = table.diameter / 2.0
     return table.completed(PlacedBead, {"radius": radius})
 
 
@@ -183,8 +185,10 @@ def walkers_of(draft: WalkerDraft, facing: str, automatic: float) -> Dimers | Cl
     """
     table = draft.table
     spacing = table.spacing
-    if spacing is None:
-        spacing = 2.0 * draft.geometry.length if table.meet else automatic
+    if spacing is None and table.meet:
+        spacing = 2.0 * draft.geometry.length
+    elif spacing is None:
+        spacing = automatic
     values = {"radii": draft.geometry.radii, "facing": facing, "spacing": spacing}
     if isinstance(table, DimersTable):
         return table.completed(Dimers, values)
@@ -320,7 +324,9 @@ def check_walkers_at_rest(case: Case, file: CaseFile, notes: Notes) -> None:
         If contacts at rest overlap too much or are pushed apart, or if neighbouring walkers would
         touch.
     """
-    given_spacings = {"dimers": None if file.dimers is None else file.dimers.spacing}
+    given_spacings = {}
+    if file.dimers is not None:
+        given_spacings["dimers"] = file.dimers.spacing
     for number, cluster in enumerate(file.clusters):
         given_spacings[f"clusters[{number}]"] = cluster.spacing
     for key, walkers in case.walkers_by_key.items():

@@ -156,10 +156,13 @@ def _composition(document: Mapping[str, Any], liquid: str | None) -> Composition
         _check_no_composition({_MASS_FRACTION: share, _TEMPERATURE: temperature})
         return None
     if type(share) not in (int, float) or not 0 <= share <= 1:
-        missing = "missing; " if share is MISSING else ""
-        expected = "the mass of the glycerol over that of the mixture, such as 0.87"
-        raise key_error(_MASS_FRACTION, f"{missing}expected {expected}")
-    text = _DEFAULT_TEMPERATURE if temperature is MISSING else str(temperature)
+        message = "expected the mass of the glycerol over that of the mixture, such as 0.87"
+        if share is MISSING:
+            message = f"missing; {message}"
+        raise key_error(_MASS_FRACTION, message)
+    text = str(temperature)
+    if temperature is MISSING:
+        text = _DEFAULT_TEMPERATURE
     try:
         return Composition(float(share), parse_quantity(text, TEMPERATURE))
     except ValueError as error:

@@ -242,9 +242,9 @@ def _number(
     entry: Mapping[str, Any], collection: Collection, liquids: tuple[str, ...] = ()
 ) -> LibraryNumber:
     """The number of an entry such as ``{ value = …, source = "…" }``; ``liquids`` calibrated it."""
-    source = entry.get("source")
-    if source is None:
-        source = f"calibrated with {' and '.join(liquids)}" if liquids else ""
+    source = entry.get("source", "")
+    if "source" not in entry and liquids:
+        source = f"calibrated with {' and '.join(liquids)}"
     ends = entry.get("range")
     return LibraryNumber(
         written=entry["value"],

@@ -62,10 +62,10 @@ class Load(NamedTuple):
 
 def dimer_of(case: Setup) -> Dimer:
     """The dimer of a case; raises `ValueError` unless its first walkers are dimers."""
-    radii = case.walkers[0].radii if case.walkers else ()
-    if len(radii) != 2:
+    if not case.walkers or len(case.walkers[0].radii) != 2:
         raise ValueError("bodies: expected dimers; the theory is for dimers only")
-    return Dimer((radii[0], radii[1]), case.beads.density, case.liquid.surface_tension)
+    front, back = case.walkers[0].radii
+    return Dimer((front, back), case.beads.density, case.liquid.surface_tension)
 
 
 def surfaces_of(case: Setup, radius: float, other_radius: float) -> Surfaces:
