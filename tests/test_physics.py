@@ -22,7 +22,7 @@ from walkers.arrays import FloatArray
 from walkers.inputs.bridge_laws import by_name
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.length import limits_of
-from walkers.inputs.resolving.loads import bridge_at_rest, delay
+from walkers.inputs.resolving.loads import bridge_at_rest, delay_of_walkers
 from walkers.inputs.tables.materials import Roughness
 from walkers.physics import reynolds
 from walkers.physics.bridge import Surfaces
@@ -309,7 +309,7 @@ def test_the_modulus_of_auto_ends_at_51_gpa() -> None:
     changes = {"liquid.name": "glycerol", "drive.frequency": "1 kHz", "run.cycles": 3}
     case = load_case("fig1b", changes)
     assert case.contact.youngs_modulus == 51.2e9
-    assert delay(case, case.walkers[0]) > 0.025
+    assert delay_of_walkers(case, case.walkers[0]) > 0.025
 
 
 @pytest.mark.parametrize(
@@ -340,7 +340,7 @@ def test_contacts_are_as_stiff_as_their_bridges_ask_for(name: str, modulus: floa
                 / (2.0 * reduced * sqrt(radius * overlap))
             )
             assert (phase > 0.025) is late
-            assert delay(softened, case.walkers[0]) == pytest.approx(phase, rel=1e-9)
+            assert delay_of_walkers(softened, case.walkers[0]) == pytest.approx(phase, rel=1e-9)
 
 
 def test_limits_at_a_plane() -> None:

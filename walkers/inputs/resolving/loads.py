@@ -20,7 +20,7 @@ from walkers.physics.capillary import bead_volume, largest_normal
 from walkers.physics.contact import hertz_overlap, hertz_stiffness, reduced_modulus
 from walkers.physics.dimer import Dimer
 
-LARGEST_DELAY = 0.025
+DELAY_LIMIT = 0.025
 """Delay of contacts by bridges up to which velocities are within 2 % of those of rigid beads,
 rad."""
 _NOTICED_DELAY = 0.1
@@ -180,14 +180,14 @@ def gravity_warnings(case: Setup) -> list[str]:
     return warnings
 
 
-def delay_of(case: Setup) -> float:
+def largest_delay(case: Setup) -> float:
     """The largest phase by which bridges delay any contact of walkers or loose beads, rad."""
-    delays = [delay(case, walkers) for walkers in case.walkers]
+    delays = [delay_of_walkers(case, walkers) for walkers in case.walkers]
     delays.append(delay_of_loose_beads(case))
     return max(delays)
 
 
-def delay(case: Setup, walkers: Walkers) -> float:
+def delay_of_walkers(case: Setup, walkers: Walkers) -> float:
     """The largest phase by which bridges delay the contacts of walkers, ωN/k, rad.
 
     A bridge damps its contact with the normal resistance N, so a contact of stiffness k lags
@@ -197,7 +197,7 @@ def delay(case: Setup, walkers: Walkers) -> float:
     Velocities differ from those of rigid beads by about 0.7 of this phase, and sliding by 2.5 of it
     (Figs. 2, 4a and 4b, up to 3.2 GPa).
     """
-    return _largest_delay(case, contact_loads(case, walkers))
+    return _delay_of_contacts(case, contact_loads(case, walkers))
 
 
 def delay_of_loose_beads(case: Setup) -> float:
@@ -206,7 +206,7 @@ def delay_of_loose_beads(case: Setup) -> float:
     It is the largest of any two beads, and of a bead at a wall. The contacts are loaded by their
     bridges alone, as at an upright wall.
     """
-    return _largest_delay(case, _loads_of_loose_beads(case))
+    return _delay_of_contacts(case, _loads_of_loose_beads(case))
 
 
 def _loads_of_loose_beads(case: Setup) -> list[Load]:
@@ -230,7 +230,7 @@ def _with_overlap(case: Setup, bridge: Load, weight: float = 0.0) -> Load:
     return bridge._replace(overlap=overlap)
 
 
-def _largest_delay(case: Setup, loads: Iterable[Load]) -> float:
+def _delay_of_contacts(case: Setup, loads: Iterable[Load]) -> float:
     """The largest 2πfN/k of contacts, rad; contacts without a load have none."""
     modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     longest = 0.0  # s

@@ -29,7 +29,7 @@ from walkers.inputs.resolving.bodies import (
 from walkers.inputs.resolving.driving import drive_of
 from walkers.inputs.resolving.from_library import ROUGHNESS
 from walkers.inputs.resolving.length import limits_of, resolved_run
-from walkers.inputs.resolving.loads import LARGEST_DELAY, bridge_at_rest, delay_of
+from walkers.inputs.resolving.loads import DELAY_LIMIT, bridge_at_rest, largest_delay
 from walkers.inputs.resolving.notes import Notes
 from walkers.inputs.resolving.own_vessel import with_vessel
 from walkers.inputs.resolving.standing import check_bodies
@@ -211,18 +211,18 @@ def _check_law(case: Setup) -> None:
 def _hardened(softest: Setup, notes: Notes) -> Setup:
     """The case with the Young's modulus of ``"auto"``, from the case with the lowest modulus.
 
-    The modulus is the lowest at which bridges delay contacts little (`LARGEST_DELAY`). In a mixture
+    The modulus is the lowest at which bridges delay contacts little (`DELAY_LIMIT`). In a mixture
     it is raised only as long as this does not shorten the time step: hard beads would cost several
     times as much.
     """
     case = softest
-    while delay_of(case) > LARGEST_DELAY and case.contact.youngs_modulus < _HARDEST:
+    while largest_delay(case) > DELAY_LIMIT and case.contact.youngs_modulus < _HARDEST:
         modulus = 4.0 * case.contact.youngs_modulus
         harder = case.with_values(contact=case.contact.with_values(youngs_modulus=modulus))
         if case.mixture is not None and _longest_step(harder) < _longest_step(case):
             break
         case = harder
-    why = f"auto: bridges delay contacts by {delay_of(case):.1g} rad"
+    why = f"auto: bridges delay contacts by {largest_delay(case):.1g} rad"
     notes.add("contact.youngs_modulus", why)
     return case
 
