@@ -17,7 +17,7 @@ from tests.conftest import REFERENCE, make_case
 from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.loads import contact_loads
-from walkers.inputs.resolving.standing import standing
+from walkers.inputs.resolving.standing import starting_groups
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
@@ -215,7 +215,7 @@ def test_a_flat_wall_is_named_by_the_side_on_which_it_stands(shape: str, walls: 
 
 def test_a_mixture_is_poured_from_above_the_walkers() -> None:
     """Their large beads, 1 mm across, are higher than the placed one of 0.8 mm; all poured beads are above both."""
-    kinds = {number: one.beads for number, one in standing(build_case(EVERYTHING))}
+    kinds = {number: one.beads for number, one in starting_groups(build_case(EVERYTHING))}
     tops = [max(bead.z + bead.radius for bead in beads) for beads in (kinds[0], kinds[2])]
     assert tops == pytest.approx([1e-3, 0.8e-3], rel=1e-3)
     assert min(bead.z - bead.radius for bead in kinds[1]) > 1e-3

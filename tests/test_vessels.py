@@ -18,7 +18,7 @@ from walkers.errors import InputError
 from walkers.inputs.case_building import build_case, changed_case, stored_case
 from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.reading import load_case
-from walkers.inputs.resolving.standing import standing as starts
+from walkers.inputs.resolving.standing import starting_groups
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.shapes.shape import LOOSE
 from walkers.inputs.tables.shapes.walls import FLOOR
@@ -398,7 +398,7 @@ def test_beads_are_poured_above_others_up_to_twice_the_height(tmp_path: Path) ->
         build_case(tables | {"mixture": mixture | {"count": 5000}})
     room = int(str(refusal.value).split()[-1])
     case = build_case(tables | {"mixture": mixture | {"count": room}})
-    (_, pile), _ = starts(case)
+    (_, pile), _ = starting_groups(case)
     heights, radius = [bead.z for bead in pile.beads], LOOSE * 0.5e-3
     assert len(heights) == room
     assert min(heights) == pytest.approx(2.5e-3 + radius)

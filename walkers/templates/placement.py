@@ -5,7 +5,7 @@ cases stand on them. The walkers may differ in radii and in how they start; in s
 restitution) and liquid, which become atom types; and in their loads: tilt of the boundary, axes and
 acceleration of the drive. Frequencies and phases of the drive are the same for all.
 
-How the beads of one walker or of one pile stand is decided in `walkers.inputs.resolving.standing`.
+How the beads of one walker or of one pile stand is decided in `walkers.inputs.resolving.starting_groups`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from functools import lru_cache
 
 from walkers.arrays import Vector
 from walkers.inputs.resolving.loads import hop_height, path_length
-from walkers.inputs.resolving.standing import Standing, standing
+from walkers.inputs.resolving.starting_groups import StartingGroup, starting_groups
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import AXES
 from walkers.inputs.tables.materials import Contact
@@ -227,17 +227,17 @@ def _largest_spacing(cases: Sequence[Case]) -> float:
     return max(spacings)
 
 
-def _standing_bodies(cases: Sequence[Case]) -> list[tuple[Case, int, Standing]]:
+def _standing_bodies(cases: Sequence[Case]) -> list[tuple[Case, int, StartingGroup]]:
     """The bodies of all cases at the start, each with its case and the number of its kind there."""
     bodies = []
     for case in cases:
-        for kind, body in standing(case):
+        for kind, body in starting_groups(case):
             bodies.append((case, kind, body))
     return bodies
 
 
 def _places_of_walkers(
-    bodies: Sequence[tuple[Case, int, Standing]], spacing: float
+    bodies: Sequence[tuple[Case, int, StartingGroup]], spacing: float
 ) -> list[tuple[float, float]]:
     """The places of the walkers on the boundary, x and y in m, for their spacing (m)."""
     walkers = 0

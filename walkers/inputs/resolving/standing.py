@@ -30,7 +30,7 @@ _MOST_DISTANCES = 10_000_000
 """Largest number of beads times walls of a vessel: each bead takes 32 bytes for each wall."""
 
 
-class StandingBead(NamedTuple):
+class StartingBead(NamedTuple):
     """Centre (m) and radius (m) of a bead at the start."""
 
     x: float
@@ -39,7 +39,7 @@ class StandingBead(NamedTuple):
     radius: float
 
 
-class Standing(NamedTuple):
+class StartingGroup(NamedTuple):
     """Beads that start together: a walker, or a group of loose beads.
 
     Attributes
@@ -54,19 +54,19 @@ class Standing(NamedTuple):
         Angle between the heading of a walker and this direction, rad; 0 for loose beads.
     """
 
-    beads: tuple[StandingBead, ...]
+    beads: tuple[StartingBead, ...]
     facing: int = 0
     angle: float = 0.0
 
 
-def standing(case: Case) -> Iterator[tuple[int, Standing]]:
+def starting_groups(case: Case) -> Iterator[tuple[int, StartingGroup]]:
     """Walkers and groups of loose beads at the start.
 
     Yields
     ------
     number : int
         Number of the body in `Case.bodies`; the number after the last one for placed beads.
-    group : Standing
+    group : StartingGroup
         The walkers come first, each alone, then the mixture, then the placed beads.
 
     Raises
@@ -87,11 +87,11 @@ def standing(case: Case) -> Iterator[tuple[int, Standing]]:
             raise key_error(f"{keys[number]}.radii", str(error)) from error
         walkers_before += body.replicates
     if case.placed:
-        placed = tuple(StandingBead(*bead.at, bead.radius) for bead in case.placed)
-        yield len(case.bodies), Standing(placed)
+        placed = tuple(StartingBead(*bead.at, bead.radius) for bead in case.placed)
+        yield len(case.bodies), StartingGroup(placed)
 
 
-def _walkers_at_start(case: Case, walkers: Walkers, walkers_before: int) -> Iterator[Standing]:
+def _walkers_at_start(case: Case, walkers: Walkers, walkers_before: int) -> Iterator[StartingGroup]:
     """The walkers of a kind; ``walkers_before`` is the number of walkers of the kinds before it."""
     overlaps_at_rest = [load.overlap for load in contact_loads(case, walkers)]
     for number in range(walkers_before, walkers_before + walkers.replicates):
@@ -100,7 +100,7 @@ def _walkers_at_start(case: Case, walkers: Walkers, walkers_before: int) -> Iter
 
 def _walker_at_start(
     case: Case, walkers: Walkers, number: int, overlaps_at_rest: Sequence[float]
-) -> Standing:
+) -> StartingGroup:
     """A walker of a kind around the contact of its first two beads.
 
     Its angle and the overlaps of its contacts are drawn from a random stream of its own, so that
@@ -136,8 +136,8 @@ def _walker_at_start(
     for (ahead, left), height, radius in zip(places, heights, walkers.radii, strict=True):
         x = ahead * heading_x - left * heading_y
         y = ahead * heading_y + left * heading_x
-        beads.append(StandingBead(x, y, height, radius))
-    return Standing(tuple(beads), facing, angle)
+        beads.append(StartingBead(x, y, height, radius))
+    return StartingGroup(tuple(beads), facing, angle)
 
 
 def _facing(case: Case, walkers: Walkers, number: int) -> int:
@@ -159,7 +159,7 @@ def _draws(seed: int, number: int) -> tuple[float, float]:
     return float(turn), float(press)
 
 
-def _poured(case: Case, mixture: Mixture) -> Standing:
+def _poured(case: Case, mixture: Mixture) -> StartingGroup:
     """The beads of a mixture on a loose lattice above the other bodies; they fall and settle.
 
     Their order and their displacements from the places of the lattice are random (seed of the
@@ -174,9 +174,9 @@ def _poured(case: Case, mixture: Mixture) -> Standing:
     for radius, (layer, x, y) in zip(radii, places, strict=False):  # there are more places
         shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * layer.play(radius, largest)
         beads.append(
-            StandingBead(x + float(shift[0]), y + float(shift[1]), floor + layer.level, radius)
+            StartingBead(x + float(shift[0]), y + float(shift[1]), floor + layer.level, radius)
         )
-    return Standing(tuple(beads))
+    return StartingGroup(tuple(beads))
 
 
 def _lattice_places(layers: Iterable[Layer]) -> Iterator[tuple[Layer, float, float]]:
@@ -291,7 +291,7 @@ def _beads_at_start(case: Case) -> list[_BeadAtStart]:
     if keys:
         spacing = max(walkers.spacing for walkers in case.walkers)
         grid = case.boundary.geometry.grid(len(keys), spacing)
-        groups = standing(case)  # the walkers come first
+        groups = starting_groups(case)  # the walkers come first
         for number, (key, (x, y)) in enumerate(zip(keys, grid, strict=True)):
             _, walker = next(groups)
             for bead in walker.beads:
