@@ -96,9 +96,7 @@ class FlatFaces:
         return self.faces, planes
 
     def _fitted_plane(self, members: list[int], toward: FloatArray) -> Plane:
-        """The plane that is nearest to the corners of triangles, with a normal toward a
-        direction.
-        """
+        """The plane nearest to the corners of triangles, with a normal toward a direction."""
         corners = self.points[np.unique(self.triangles[members])]
         middle = corners.mean(axis=0)
         normal = np.linalg.svd(corners - middle, full_matrices=False)[2][2]

@@ -28,6 +28,7 @@ _LONGEST_READING = 2.0 * mesh_reader.MOST_SECONDS
 _LONGEST_REASON = 300
 """Largest length of a reader's message that is quoted, letters."""
 _FORMATS = "STL, OBJ, PLY, OFF, VTP, VTU, VTK, or another format of meshio"
+"""Formats that can be read, for messages."""
 
 
 def read_mesh(path: Path) -> dict[str, Any]:
@@ -125,9 +126,7 @@ def _unreadable(reason: str) -> ValueError:
 
 
 def _printed_by_library(text: str) -> str:
-    """The first error or warning that VTK or meshio has printed, without its place in their
-    code.
-    """
+    """The first error or warning of VTK or meshio, without its place in their code."""
     plain = re.sub(r"\x1b\[[0-9;]*m", "", text)
     for line in re.findall(r"(?:ERR|WARN)\| *(.+)", plain):
         if "returned failure for request" not in line:

@@ -215,9 +215,7 @@ def _check_opening(vessel: Vessel) -> None:
 
 
 def _without_hollows(vessel: Vessel) -> Vessel:
-    """The vessel with the bodies that are in it; hollows in bodies are left out: no bead gets
-    there.
-    """
+    """The vessel with the bodies in it, without hollows in bodies, where no bead gets."""
     numbers = sorted(set(vessel.parts[~vessel.outer].tolist()))
     if not numbers:
         return vessel

@@ -1,6 +1,4 @@
-"""Triangles of surfaces: which are the same, which are connected, and how far places are from
-them.
-"""
+"""Triangles of surfaces: merging, connection, and distances of places from them."""
 
 from __future__ import annotations
 

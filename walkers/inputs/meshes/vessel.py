@@ -80,9 +80,7 @@ class Vessel:
 
     @cached_property
     def _area_vectors(self) -> FloatArray:
-        """Normals of the triangles, toward the beads, as long as twice their areas (m²), shape
-        (T, 3).
-        """
+        """Normals of the triangles as long as twice their areas (m²), toward the beads, (T, 3)."""
         first, second, third = self.points[self.triangles.T]
         area_vectors: FloatArray = np.cross(second - first, third - first)
         return area_vectors
@@ -96,9 +94,7 @@ class Vessel:
 
     @cached_property
     def sides_at_edges(self) -> dict[frozenset[int], list[Side]]:
-        """Sides of triangles at each edge, by the two points of the edge: one at an opening, else
-        two.
-        """
+        """Sides of triangles at each edge, by its two points: one at an opening, else two."""
         sides: dict[frozenset[int], list[Side]] = defaultdict(list)
         for triangle, corners in enumerate(self.triangles.tolist()):
             for side in range(3):
@@ -121,8 +117,9 @@ class Vessel:
 
     @cached_property
     def parts(self) -> IntArray:
-        """Number of the part of each triangle, shape (T,). Triangles of a part are connected by
-        edges.
+        """Number of the part of each triangle, shape (T,).
+
+        Triangles of a part are connected by edges.
         """
         return groups_of(self.neighbours, len(self.triangles))
 
@@ -155,8 +152,7 @@ class Vessel:
 
     @cached_property
     def faces(self) -> IntArray:
-        """Number of the face of each triangle, which is that of the largest triangle in it, shape
-        (T,).
+        """Number of the face of each triangle, shape (T,): that of its largest triangle.
 
         A face is made of connected triangles whose corners are all within 1 nm of one plane, or
         within the rounding of single precision if that is more.
@@ -230,9 +226,7 @@ class Vessel:
         return not leaning.any()
 
     def _has_unfit_edge(self) -> bool:
-        """Whether faces at an edge turn by little, or back: planes without end would then
-        differ.
-        """
+        """Whether faces turn at an edge by little, or so that it stands out (see `planes`)."""
         for sides in self.sides_at_edges.values():
             if len({self.faces[triangle] for triangle, _ in sides}) != 2:
                 continue
@@ -290,9 +284,7 @@ class Vessel:
         return bool(self.faces[first] == self.faces[second])
 
     def _outstanding_edges(self) -> list[list[Side]]:
-        """Edges that stand out toward the beads, and those of the rim, by the sides that are
-        there.
-        """
+        """Sides at each edge that stands out toward the beads, and at each edge of the rim."""
         edges = []
         for sides in self.sides_at_edges.values():
             if len(sides) == 2 and (self._is_within_face(sides) or not self._stands_out(*sides)):

@@ -58,9 +58,7 @@ def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Ve
 
 
 def _end_planes(height: float, far: float) -> list[tuple[Vector, Vector]]:
-    """Planes that end the space between planes: at the height (m), and far away (m) at the other
-    sides.
-    """
+    """Planes that end the vessel: at its height (m), and far away (m) on the other sides."""
     ends: list[tuple[Vector, Vector]] = [((0.0, 0.0, height), (0.0, 0.0, -1.0))]
     inward_axes = [*np.eye(3), *-np.eye(3)[:2]]
     ends += [(_vector(-far * axis), _vector(axis)) for axis in inward_axes]

@@ -228,9 +228,7 @@ def facing_of(draft: WalkerDraft, key: str, boundary: Boundary) -> str:
 
 
 def _check_arrangement(cluster: WalkerGeometry, key: str) -> None:
-    """Refuse an unknown arrangement, and beads that cannot be arranged so; ``key`` of the
-    cluster.
-    """
+    """Refuse an unknown arrangement, and beads that do not fit it; ``key`` of the cluster."""
     name = cluster.arrangement
     arrangement = ARRANGEMENTS.get(name)
     if arrangement is None:

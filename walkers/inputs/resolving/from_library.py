@@ -41,8 +41,7 @@ _OF_SURFACES = (
     "contact.rolling_friction",
     "contact.restitution",
 )
-"""Other keys that the surface pair of beads and boundary gives; its entries have their last
-words."""
+"""Other keys that the pair of beads and boundary gives; it names them by their last parts."""
 SUPPLIED = ("beads.density", *OF_LIQUIDS, *_FRICTION, *ROUGHNESS, *_OF_SURFACES)
 """Keys that a case may leave out because the library has values or defaults."""
 _DESCRIBING_SURFACES = (*_FRICTION, "contact.rolling_friction")
@@ -53,7 +52,9 @@ _DESCRIBING_LIQUID = (
 )
 """Groups of keys each of which describes a liquid completely."""
 _MASS_FRACTION = "liquid.mass_fraction"
+"""Key of the mass fraction of a liquid that is a mixture."""
 _TEMPERATURE = "liquid.temperature"
+"""Key of the temperature of such a liquid."""
 _DEFAULT_TEMPERATURE = "20 degC"
 """Temperature of a liquid that is a mixture, if the case gives none."""
 

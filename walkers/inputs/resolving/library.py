@@ -354,8 +354,9 @@ def _library_of_program() -> Library:
 
 
 def read_library(folder: Path) -> dict[str, Any]:
-    """The tables of the user's own library in a folder, with its path at ``file``; empty if there
-    is none.
+    """The tables of the user's own library in a folder, and its path at ``file``.
+
+    There are none if the folder has no library.
 
     Raises
     ------

@@ -21,8 +21,7 @@ from walkers.physics.contact import hertz_overlap, hertz_stiffness, reduced_modu
 from walkers.physics.dimer import Dimer
 
 DELAY_LIMIT = 0.025
-"""Delay of contacts by bridges up to which velocities are within 2 % of those of rigid beads,
-rad."""
+"""Delay of contacts, rad, up to which velocities are within 2 % of those of rigid beads."""
 _NOTICED_DELAY = 0.1
 """Smallest delay of loose beads at which a result warns of their softness, rad."""
 _MEASURED_DELAYS = (0.0, 0.13, 0.34, 1.5, 3.8)
@@ -84,9 +83,7 @@ def surfaces_of(case: Setup, radius: float, other_radius: float) -> Surfaces:
 
 
 def bridge_at_rest(case: Setup, radius: float, other_radius: float) -> Load:
-    """The bridge between surfaces that touch, by the law of the case; radii as for
-    `surfaces_of`.
-    """
+    """The bridge of a case between surfaces that touch; radii as for `surfaces_of`, m."""
     return _bridge_in_contact(case.law, surfaces_of(case, radius, other_radius))
 
 
@@ -222,9 +219,7 @@ def _loads_of_loose_beads(case: Setup) -> list[Load]:
 
 
 def _with_overlap(case: Setup, bridge: Load, weight: float = 0.0) -> Load:
-    """A bridge with the overlap at which repulsion balances its capillary force and a weight
-    (N).
-    """
+    """A bridge with the overlap at which repulsion balances its force and a weight (N)."""
     modulus = reduced_modulus(case.contact.youngs_modulus, case.contact.poissons_ratio)
     overlap = hertz_overlap(bridge.pull + weight, bridge.surfaces.reduced_radius, modulus)
     return bridge._replace(overlap=overlap)

@@ -75,9 +75,7 @@ def with_vessel(
 
 
 def _check_width(boundary: Boundary, width: float, diameter: float) -> None:
-    """Refuse a vessel whose width (m) is out of proportion to the diameter of the largest bead
-    (m).
-    """
+    """Refuse a vessel whose width (m) is too small or too large for the beads (diameter in m)."""
     if 1.0 < width / diameter < _WIDEST:
         return
     problem = f"the vessel is {_length_text(width)} wide and the beads {_length_text(diameter)}"

@@ -152,9 +152,7 @@ def _facing(case: Case, walkers: Walkers, number: int) -> int:
 
 @lru_cache(maxsize=4096)
 def _draws(seed: int, number: int) -> tuple[float, float]:
-    """Two numbers from −1 to 1 of the random stream of a walker: for its angle, and its
-    overlaps.
-    """
+    """Two random numbers of a walker, from −1 to 1: for its angle, and for its overlaps."""
     turn, press = default_rng([seed, number]).uniform(-1.0, 1.0, size=2)
     return float(turn), float(press)
 
@@ -303,9 +301,7 @@ def _beads_at_start(case: Case) -> list[_BeadAtStart]:
 
 
 def _cut_by_walls(case: Case, beads: Sequence[_BeadAtStart]) -> list[_BeadAtStart]:
-    """The beads that side walls cut, and those of walkers that stand beside the floor of a
-    vessel.
-    """
+    """The beads that side walls cut, and walkers' beads beside the floor of a vessel."""
     places = np.array([bead.place for bead in beads])
     clearances = case.boundary.geometry.side_clearance(places)
     if case.walkers:
@@ -351,9 +347,7 @@ def _check_width(case: Case) -> None:
 
 
 def _expected_number(case: Case, key: str) -> str:
-    """A message with the number of walkers of a kind that fit between the walls beside the
-    others.
-    """
+    """A message with the number of walkers of a kind that fit between the walls."""
 
     def too_many(number: int) -> bool:
         fewer = case.with_value_at(f"{key}.replicates", number)

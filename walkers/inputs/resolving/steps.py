@@ -1,5 +1,4 @@
-"""Values that follow from others: makes a case of the tables of its file, in the order of the
-physics.
+"""Values that follow from others, in the order of the physics: from a file to a case.
 
 `resolve` takes a `CaseFile`, in which values may be missing. It completes the tables of the
 bodies, the drive, the liquid and the contacts to a `Setup`, and adds the run, which makes it a
