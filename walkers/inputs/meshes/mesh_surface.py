@@ -86,8 +86,9 @@ def _centred(vessel: Vessel) -> Vessel:
     """The vessel with its lowest point at z = 0 and its middle on the z axis, to twelve digits."""
     low = vessel.points.min(axis=0)
     high = vessel.points.max(axis=0)
-    middle = np.array([*(low + high)[:2] / 2.0, low[2]])
-    points = [_with_twelve_digits(point) for point in vessel.points - middle]
+    origin = (low + high) / 2.0
+    origin[2] = low[2]
+    points = [_with_twelve_digits(point) for point in vessel.points - origin]
     return Vessel(np.array(points), vessel.triangles)
 
 

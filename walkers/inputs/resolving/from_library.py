@@ -134,10 +134,11 @@ def _unknown_names(
     }
     problems = []
     for key, name in names.items():
-        known = library.names("liquids" if key == "liquid.name" else "materials")
-        if name is None or described[key] or name in known:
+        kind = "liquids" if key == "liquid.name" else "materials"
+        names_in_library = library.names(kind)
+        if name is None or described[key] or name in names_in_library:
             continue
-        expected = f"nor in a library.toml beside the case; {expected_of(name, known)}"
+        expected = f"nor in a library.toml beside the case; {expected_of(name, names_in_library)}"
         problems.append(Problem(key, quoted(name), f"not in the library, {expected}"))
     return problems
 

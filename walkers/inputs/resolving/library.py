@@ -114,8 +114,8 @@ class Library:
     def __init__(self, own_tables: Mapping[str, Any] | None = None) -> None:
         self.collections: list[Collection] = []
         if own_tables:
-            own = Collection("own library", own_tables.get("file", ""), own_tables)
-            self.collections.append(own)
+            file = own_tables.get("file", "")
+            self.collections.append(Collection("own library", file, own_tables))
         self.collections.append(Collection("library", "", _tables_of_program()))
 
     def names(self, kind: str) -> tuple[str, ...]:
