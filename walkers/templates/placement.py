@@ -16,7 +16,7 @@ from functools import lru_cache
 
 from walkers.arrays import Vector
 from walkers.inputs.resolving.loads import hop_height, path_length
-from walkers.inputs.resolving.starting_groups import StartingGroup, starting_groups
+from walkers.inputs.resolving.standing import StartingGroup, starting_groups
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import AXES
 from walkers.inputs.tables.materials import Contact

@@ -261,7 +261,9 @@ def _check_places(cluster: WalkerGeometry, key: str) -> None:
     if overlapping:
         first, second = overlapping[0]
         distance = dist(places[first], places[second])
-        message = overlap_message(f"{key}[{first}]", distance, cluster.rigid_distance(first, second))
+        message = overlap_message(
+            f"{key}[{first}]", distance, cluster.rigid_distance(first, second)
+        )
         raise key_error(f"{key}[{second}]", message)
     if not any(cluster.front):
         raise key_error(key, "expected some beads ahead of others: this walker has no heading")

@@ -53,9 +53,9 @@ def limits_of(case: Setup) -> TimeStepLimits:
         largest = placed[-1]
         bridged.append((largest, [smallest]))
         bridged.append((smallest, [largest]))
-    shape = case.boundary.geometry
+    damping = case.boundary.geometry.damping
     return time_step_limits(
-        [(radius, neighbours, shape.damping(radius)) for radius, neighbours in bridged],
+        [BridgedBead(radius, neighbours, damping(radius)) for radius, neighbours in bridged],
         density=case.beads.density,
         youngs_modulus=case.contact.youngs_modulus,
         poissons_ratio=case.contact.poissons_ratio,
@@ -171,7 +171,7 @@ def cycles_of(table: RunTable, drive: Excitation, cycles_per_sample: int) -> int
     cycles_per_sample
         Cycles between samples, at least 1.
     """
-    fewest, most = drive.cycles
+    fewest, most = drive.cycle_limits
     cycles_of_record = 0
     if drive.ends:
         cycles_of_record = floor((most + 1e-9) / cycles_per_sample) * cycles_per_sample
@@ -290,7 +290,7 @@ def _check_cycles_of_drive(drive: Excitation, run: RunSettings, key: str) -> Non
             rows = f"its rows, {1e6 * interval:.3g} us apart, are closer than the time step"
             message = f"{rows}, {1e6 * run.time_step:.3g} us; expected fewer rows"
             raise key_error("drive.record", f"{message}, or a shorter run.time_step", record.file)
-    fewest, most = drive.cycles
+    fewest, most = drive.cycle_limits
     if run.cycles < fewest:
         end_of_ramp = f"{drive.ramp[-1][0]:g} s"
         message = f"expected at least {ceil(fewest)} cycles, {end_of_ramp}, of drive.ramp"

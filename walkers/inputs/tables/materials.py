@@ -124,7 +124,7 @@ class ContactTable(ConfigTable):
     """``[contact]``: the model of the contacts, whose Young's modulus is that of softened bodies.
 
     An automatic modulus is 50 MPa for loose beads. For walkers it is the lowest of 50, 200, 800, …
-    MPa at which bridges hardly delay the contacts (`walkers.inputs.resolving.loads.delay`).
+    MPa at which bridges hardly delay the contacts (`walkers.inputs.resolving.loads.largest_delay`).
     """
 
     friction: Friction = key("")
