@@ -94,7 +94,7 @@ def test_beads_of_a_cluster_touch_as_its_arrangement_says(shape: str) -> None:
     """Touching pairs overlap by what carries their load, the beads the floor too, and no others overlap."""
     arrangement, sizes = shape.split()
     case = of_tables(cluster(arrangement, sizes, gap_spread=0.0))
-    make, loads = case.walkers[0], [load.overlap for load in contact_loads(case, case.walkers[0])]
+    kind, loads = case.walkers[0], [load.overlap for load in contact_loads(case, case.walkers[0])]
     scene, (first, _) = place((case,))
     beads = [next(bead for bead in scene.beads if bead.id == number) for number in first.beads]
     assert [bead.radius - bead.centre[2] for bead in beads] == pytest.approx(
@@ -107,14 +107,14 @@ def test_beads_of_a_cluster_touch_as_its_arrangement_says(shape: str) -> None:
             beads[one].radius + beads[other].radius,
         )
         overlap = both - np.linalg.norm(between)
-        if (one, other) in make.pairs:
+        if (one, other) in kind.pairs:
             assert overlap == pytest.approx(
-                loads[len(sizes) + make.pairs.index((one, other))], rel=1e-4
+                loads[len(sizes) + kind.pairs.index((one, other))], rel=1e-4
             )
         else:
             assert overlap < 0.0
         extents.append(np.hypot(*between[:2]) + both)
-    assert make.length == pytest.approx(max(extents), rel=2e-3)
+    assert kind.length == pytest.approx(max(extents), rel=2e-3)
 
 
 def test_pairs_of_beads_are_numbered_along_the_arrangement_and_head_to_the_large_one() -> None:

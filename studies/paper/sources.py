@@ -76,7 +76,7 @@ class NothingFinishedError(WalkersError):
 
 
 class Sources:
-    """Sweeps in a folder: ``table`` gives the table of one by its name, ``trajectory`` the first make of a run."""
+    """Sweeps in a folder: ``table`` gives the table of one by its name, ``trajectory`` the first kind of a run."""
 
     def __init__(self, out: Path) -> None:
         self.out = out

@@ -242,7 +242,7 @@ def _quantities_of_loose_beads(motion: Motion) -> list[ComparedQuantity]:
 def _quantities_of_walkers(group: Group, label: str) -> list[ComparedQuantity]:
     """Means over the walkers of a kind; the names of the quantities end with its label."""
     beads = [f"bead {bead + 1}" for bead in range(len(group.radii))]
-    pairs = [f"beads {first + 1}-{second + 1}" for first, second in group.make.pairs]
+    pairs = [f"beads {first + 1}-{second + 1}" for first, second in group.kind.pairs]
     contacts = beads + pairs
     velocity = 1e3 * float(measure_walk(group)["velocity"].mean())
     quantities = [ComparedQuantity(f"velocity{label}", velocity, "mm/s", "walking")]

@@ -6,9 +6,9 @@ A run stores the layout as ``layout.json``, from which its dumps are read
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Any
+from typing import Annotated, Any
 
+from pydantic import AliasChoices, Field, TypeAdapter
 from pydantic.dataclasses import dataclass
 
 BEAD_COLUMNS = (
@@ -67,6 +67,9 @@ PAIR_BRIDGE_COLUMNS = ("id1", "id2", "fx", "fy", "fz", "overlap")
 WALL_BRIDGE_COLUMNS = ("wall", "id", "fx", "fy", "fz", "overlap")
 """Columns of the dump of bridges to walls: number of the wall, force (N) on bead ``id``."""
 
+_KIND_NAMES = AliasChoices("kind", "kind")
+"""Names of the field ``kind`` of `PlacedWalker` in Python, and in ``layout.json``."""
+
 
 @dataclass(frozen=True)
 class PlacedWalker:
@@ -76,7 +79,7 @@ class PlacedWalker:
     ----------
     walker
         Its number in the deck, from 0.
-    make
+    kind
         Number of its kind in the case, from 0.
     beads
         Numbers of its beads in the engine.
@@ -89,7 +92,7 @@ class PlacedWalker:
     """
 
     walker: int
-    make: int
+    kind: Annotated[int, Field(validation_alias=_KIND_NAMES, serialization_alias="kind")]
     beads: tuple[int, ...]
     facing: int
     start_angle: float

@@ -200,7 +200,7 @@ def place(cases: tuple[Case, ...]) -> tuple[PlacedBodies, tuple[PlacedWalker, ..
         if is_walker:
             walker = PlacedWalker(
                 walker=len(walkers),
-                make=kind,
+                kind=kind,
                 beads=ids,
                 facing=body.facing,
                 start_angle=body.angle,

@@ -19,12 +19,12 @@ def caption(case: Case) -> str:
     '6 walkers of R = 0.6 / 0.3 mm on a plane of glass, Si AK5; 80 Hz, a0 = 19.6 m/s²'
     """
     bodies = [
-        f"{counted(make.replicates, 'walker')} of R = {radii_text(make.radii)} mm"
-        for make in case.walkers
+        f"{counted(kind.replicates, 'walker')} of R = {radii_text(kind.radii)} mm"
+        for kind in case.walkers
     ]
     if case.loose:
         bodies.append(
-            f"{case.count - sum(len(make.all_radii) for make in case.walkers)} loose beads"
+            f"{case.count - sum(len(kind.all_radii) for kind in case.walkers)} loose beads"
         )
     boundary = (
         f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"

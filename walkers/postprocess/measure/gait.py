@@ -70,7 +70,7 @@ def gait(group: Group) -> Gait:
         "fwbx,fwbx->fwb", group.spin, np.cross(_normals(group), heading[:, :, None])
     )  # fmt: skip
     sliding = [along - turning]
-    for first, second in group.make.pairs:
+    for first, second in group.kind.pairs:
         arm = group.position[:, :, first] - group.position[:, :, second]
         arm[..., 2] = 0.0
         arm *= np.where(np.einsum("fwx,fwx->fw", arm, heading) < 0.0, -1.0, 1.0)[..., None]
@@ -131,7 +131,7 @@ def averages(group: Group) -> Averages:
         .reshape(cycles, run.samples_per_cycle, -1)
         .sum(axis=1)
     )
-    mean = gait(group.motion.averaged.group(group.walkers[0].make))
+    mean = gait(group.motion.averaged.group(group.walkers[0].kind))
     return Averages(
         rotation=mean.rotation[samples].mean(axis=0),
         sliding=mean.sliding[samples].mean(axis=0),

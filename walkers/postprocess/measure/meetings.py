@@ -38,12 +38,12 @@ def applies(case: Case) -> bool:
 
 def derived(case: Case) -> dict[str, float]:
     """Coverage, rounded to three digits so that equal trays form one group in figures."""
-    boundary, spacing = case.boundary, max(make.spacing for make in case.walkers)
+    boundary, spacing = case.boundary, max(kind.spacing for kind in case.walkers)
     cell = spacing * (boundary.width or spacing)
     floor = (
         boundary.geometry.cross_section
         if boundary.closed
-        else cell * sum(make.replicates for make in case.walkers)
+        else cell * sum(kind.replicates for kind in case.walkers)
     )
     return {"coverage": float(f"{pi * sum(radius**2 for radius in case.all_radii) / floor:.3g}")}
 

@@ -159,12 +159,12 @@ class Motion:
 
     @cached_property
     def groups(self) -> list[Group]:
-        """The walkers by make, during the drive."""
+        """The walkers by kind, during the drive."""
         return [self.driven.group(number) for number in range(len(self.case.walkers))]
 
     def group(self, number: int) -> Group:
-        """The walkers of a make, in all frames."""
-        walkers = [walker for walker in self.walkers if walker.make == number]
+        """The walkers of a kind, in all frames."""
+        walkers = [walker for walker in self.walkers if walker.kind == number]
         rows = np.array([walker.beads for walker in walkers], dtype=np.int64)
         moved = (array[:, rows] for array in (self.position, self.velocity, self.spin))
         return Group(self, self.case, self.case.walkers[number], walkers, rows, self.time, *moved)
@@ -172,7 +172,7 @@ class Motion:
 
 @dataclass(frozen=True, repr=False)
 class Group:
-    """The W walkers of one make, of n beads each, in F frames of a motion of all beads; SI units.
+    """The W walkers of one kind, of n beads each, in F frames of a motion of all beads; SI units.
 
     ``rows`` are the indices of their beads in the motion, shape (W, n); positions, velocities and spins have the shape
     (F, W, n, 3).
@@ -180,7 +180,7 @@ class Group:
 
     motion: Motion
     case: Case
-    make: Walkers
+    kind: Walkers
     walkers: list[PlacedWalker]
     rows: IntArray
     time: FloatArray
@@ -191,7 +191,7 @@ class Group:
     @property
     def radii(self) -> FloatArray:
         """Radii of the beads of each walker, m, shape (n,)."""
-        return np.array(self.make.radii)
+        return np.array(self.kind.radii)
 
     @cached_property
     def mass_centre(self) -> FloatArray:
@@ -217,7 +217,7 @@ class Group:
         They point from the centroid of the small beads to that of the large beads; with beads of one size, from the
         hindmost to the foremost beads (`walkers.inputs.tables.bodies.Walkers.toward_large`).
         """
-        arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.make.toward_large))
+        arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.kind.toward_large))
         arm[..., 2] = 0.0
         heading: FloatArray = arm / np.linalg.norm(arm, axis=-1, keepdims=True)
         return heading
@@ -232,7 +232,7 @@ class Group:
             else [wall.distances(position) for wall in boundary.walls]
         )
         gaps = [reduce(np.minimum, heights) - self.radii]
-        for first, second in self.make.pairs:
+        for first, second in self.kind.pairs:
             distance = np.linalg.norm(position[:, :, first] - position[:, :, second], axis=-1)
             gaps.append((distance - (self.radii[first] + self.radii[second]))[..., None])
         return np.concatenate(gaps, axis=-1)
@@ -243,8 +243,8 @@ class Group:
 
         An arrangement that faces this direction has ψ = 0, also if its beads in front are beside its middle.
         """
-        ahead, aside = np.array(self.make.front) @ np.array(self.make.design)
-        arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.make.front))
+        ahead, aside = np.array(self.kind.front) @ np.array(self.kind.design)
+        arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.kind.front))
         facing = np.array([walker.facing for walker in self.walkers])
         turned = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis))
         angle: FloatArray = np.unwrap(turned - np.arctan2(aside, ahead), axis=0)

@@ -63,7 +63,7 @@ def derived(case: Case) -> dict[str, float]:
 
 
 def measure(motion: Motion) -> Measurement:
-    """Tables and numbers of all walkers; rotation, sliding and contacts are those of the first make."""
+    """Tables and numbers of all walkers; rotation, sliding and contacts are those of the first kind."""
     case, groups = motion.case, motion.groups
     of_makes = [tables_of(group) for group in groups]
     tables = {name: _stacked([tables[name] for tables in of_makes]) for name in of_makes[0]}
@@ -147,13 +147,16 @@ def _stacked(parts: Sequence[Columns]) -> Columns:
 
 
 def tables_of(group: Group) -> dict[str, Columns]:
-    """Tables ``trajectory``, ``walkers`` and ``cycles`` of the walkers of one make, one walker after the other."""
+    """Tables ``trajectory``, ``walkers`` and ``cycles`` of the walkers of one kind, one walker after the other."""
     run, seen, mean = group.case.run, gait.gait(group), gait.averages(group)
     samples, beads = gait.settled_samples(run), len(group.radii)
-    reach = np.array([load.rupture for load in contact_loads(group.case, group.make)[beads:]])
-    starts = ("walker", "make", "facing", "start_angle")
+    reach = np.array([load.rupture for load in contact_loads(group.case, group.kind)[beads:]])
+    placed = group.walkers
     walkers = {
-        **{name: np.array([getattr(walker, name) for walker in group.walkers]) for name in starts},
+        "walker": np.array([walker.walker for walker in placed]),
+        "make": np.array([walker.kind for walker in placed]),
+        "facing": np.array([walker.facing for walker in placed]),
+        "start_angle": np.array([walker.start_angle for walker in placed]),
         **gait.measure_walk(group),
         "orientation_mean": group.orientation[samples].mean(axis=0),
         "orientation_end": group.orientation[-1],
@@ -220,7 +223,7 @@ def _bridges(motion: Motion) -> Columns:
     contact_of: dict[tuple[int, int], int] = {}  # by two beads, or by a bead and −1 for a wall
     for walker in motion.walkers:
         touching = [(bead, -1) for bead in walker.beads]
-        pairs = motion.case.walkers[walker.make].pairs
+        pairs = motion.case.walkers[walker.kind].pairs
         touching += [(walker.beads[lower], walker.beads[upper]) for lower, upper in pairs]
         contact_of |= {ends: number for number, ends in enumerate(touching, 1)}
     parts = [
@@ -323,7 +326,7 @@ def _is_symmetric(case: Case) -> bool:
 
 
 def _depends_on_start(walkers: Columns, facing: IntArray, case: Case) -> bool:
-    """Whether steady walkers of one make differ; both directions are one if boundary and drive are symmetric."""
+    """Whether steady walkers of one kind differ; both directions are one if boundary and drive are symmetric."""
     kept = (
         walkers["steady"]
         & np.isnan(walkers["turned_at"])
@@ -358,5 +361,5 @@ def walkers_met(groups: Sequence[Group]) -> bool:
     """Whether two walkers came so close that they are not independent."""
     centres = [group.mass_centre[:: group.case.run.samples_per_cycle, :, :2] for group in groups]
     return came_near(
-        np.concatenate(centres, axis=1), NEAR * max(group.make.length for group in groups)
+        np.concatenate(centres, axis=1), NEAR * max(group.kind.length for group in groups)
     )

@@ -363,14 +363,14 @@ def paths_figure(case: Case, tables: Tables) -> Figure:
         look | {"marker": "", "linestyle": "-"}
         for look in line_styles([f"walker {n}" for n in range(len(x))])
     ]
-    reach = 2.0 * max(make.length for make in case.walkers)
+    reach = 2.0 * max(kind.length for kind in case.walkers)
     height = 0.7 * TWO_COLUMNS * min(1.2, max(0.3, (np.ptp(y) + reach) / (np.ptp(x) + reach)))
     figure, (axes,) = _panels("paths", case, {"trajectory": columns}, [looks])
     figure.set_figheight(0.9 + height)
     axes.plot(1e3 * x[:, 0], 1e3 * y[:, 0], "o", color=_GREY, mfc="none", ms=2.5, mew=0.6)
     drive, across = np.array(case.drive_axis), np.cross([0.0, 0.0, 1.0], case.drive_axis)
-    for row, make in enumerate(case.walkers[number] for number in walkers["make"]):
-        place, weights = np.array(make.design), np.array(make.radii) ** 3
+    for row, kind in enumerate(case.walkers[number] for number in walkers["make"]):
+        place, weights = np.array(kind.design), np.array(kind.radii) ** 3
         place = walkers["facing"][row] * (place - weights @ place / weights.sum())
         turn = np.array(
             [
@@ -379,7 +379,7 @@ def paths_figure(case: Case, tables: Tables) -> Figure:
             ]
         )
         beads = place @ turn @ np.array([drive, across])[:, :2] + [x[row, -1], y[row, -1]]
-        for bead, radius in zip(beads, make.radii, strict=True):
+        for bead, radius in zip(beads, kind.radii, strict=True):
             colour = looks[walkers["walker"][row]]["color"]
             axes.add_patch(Circle(1e3 * bead, 1e3 * radius, fc=colour, ec="none", alpha=0.5))
     if case.boundary.closed:

@@ -82,7 +82,7 @@ def gathered(motion: Motion, lane: float = 2.0) -> Motion:
     case = motion.case
     if not case.apart:
         return motion
-    lane *= max(make.length for make in case.walkers)
+    lane *= max(kind.length for kind in case.walkers)
     across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
     shift = np.zeros((len(motion.radius), 3))
     for number, walker in enumerate(motion.walkers):

@@ -141,12 +141,12 @@ def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
     """The motion that is shown, the stride of the frames, and both as captions."""
     captions, count = [], len(motion.walkers)
     if motion.case.apart:
-        firsts = {walker.make: walker for walker in reversed(motion.walkers)}
+        firsts = {walker.kind: walker for walker in reversed(motion.walkers)}
         motion = motion.of_walkers(sorted(firsts.values(), key=lambda walker: walker.walker))
         if len(firsts) < count:
-            of_makes = "" if len(firsts) == 1 else " of each make"
+            of_kinds = "" if len(firsts) == 1 else " of each kind"
             captions.append(
-                f"The view shows the first walker{of_makes}; the run has {count} walkers."
+                f"The view shows the first walker{of_kinds}; the run has {count} walkers."
             )
     stride, samples = (
         ceil(len(motion.time) * len(motion.radius) / places),
