@@ -24,7 +24,7 @@ from walkers.inputs.tables.drive import Harmonic, waveform
 from walkers.postprocess.measure import meetings
 from walkers.postprocess.measure.gait import averages, fit_slopes, settled_samples
 from walkers.postprocess.measure.motion import Bridges, Motion
-from walkers.postprocess.measure.numbers import in_short
+from walkers.postprocess.measure.numbers import short_text
 from walkers.postprocess.measure.piles import _of_climbs, _state_of
 from walkers.postprocess.measure.uncertainty import SPREAD_NAME, bands_of, spread_of
 from walkers.postprocess.measure.walking import _doubts, _posture, _scatter, _velocities, tables_of
@@ -775,7 +775,7 @@ def test_a_ramp_down_and_up_has_two_thresholds() -> None:
         "starts_at": 8.82,
         "goes_uphill": False,
     }
-    assert in_short(numbers) == "stops at 0.8 g, starts at 0.9 g"
+    assert short_text(numbers) == "stops at 0.8 g, starts at 0.9 g"
 
 
 def test_slow_motion_in_words() -> None:

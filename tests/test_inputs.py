@@ -26,7 +26,7 @@ from walkers.inputs.sweep import expand
 from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.units import parse_quantity, quantity_text
 from walkers.physics.mixtures import water_glycerol
-from walkers.postprocess.measure.uncertainty import lines_of_rest, rests_on
+from walkers.postprocess.measure.uncertainty import uncertain_value_lines, uncertain_values
 from walkers.runs.preview import preview_text, summarise
 from walkers.sweeps.spread import spread_sweep
 
@@ -165,7 +165,7 @@ def test_what_is_called_uncertain_keeps_where_it_comes_from(tmp_path: Path) -> N
     assert (radius.text, radius.guessed) == ("0.2 mm", True)
     assert ", uncertain, range 0.1 to 0.4" in call("show", str(file), check=True).stdout
     assert "uncertain  surface_tension 19.2 mN/m" in "\n".join(
-        lines_of_rest(rests_on(case.origins))
+        uncertain_value_lines(uncertain_values(case.origins))
     )
     assert {*ranges} < set(spread_sweep(case, 2).keys)
     # Points of sweeps may leave the range; the case itself may not.

@@ -25,7 +25,7 @@ from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure import meetings
 from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.numbers import band_text
-from walkers.postprocess.measure.uncertainty import SPREAD_NAME, held_text, spread_of
+from walkers.postprocess.measure.uncertainty import SPREAD_NAME, fixed_values_text, spread_of
 from walkers.sweeps.record import SweepRecord
 from walkers.sweeps.scheduler import SweepOptions
 from walkers.sweeps.spread import run_spread, spread_in, spread_sweep, spread_text
@@ -381,7 +381,7 @@ def test_a_spread_over_what_nobody_measured(runs_folder: Path) -> None:
     for text in (
         "4 draws: too few for rank correlations",
         "4 draws, approximate",
-        held_text(spread.held),
+        fixed_values_text(spread.held),
     ):
         assert text in page
     assert "rank correlation " not in page

@@ -25,7 +25,7 @@ from walkers.inputs.resolving import library
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.measure.motion import read_motion
-from walkers.postprocess.measure.numbers import fell, headline, rows
+from walkers.postprocess.measure.numbers import headline, not_all_upright, rows
 from walkers.postprocess.measure.quantities import declared, ordered
 from walkers.postprocess.measure.results import NotComputed, headlines, not_computed, text
 from walkers.postprocess.measure.tables import read_columns
@@ -169,7 +169,7 @@ def test_the_main_number_of_points_depends_on_what_their_walkers_do(steep: walke
 
 
 def test_a_pile_that_climbs_has_not_fallen() -> None:
-    assert not fell({"goes_uphill": True, "climbs": 0})
+    assert not not_all_upright({"goes_uphill": True, "climbs": 0})
 
 
 def test_the_final_angle_is_printed_unless_some_walkers_turned_over(steep: walkers.Run) -> None:

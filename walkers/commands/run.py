@@ -226,7 +226,7 @@ def sweep(
         Number of runs of each point for --spread; default: 32.
     """
     from walkers.inputs.sweep import load_sweep
-    from walkers.postprocess.measure.uncertainty import lines_of_rest, rests_on
+    from walkers.postprocess.measure.uncertainty import uncertain_value_lines, uncertain_values
     from walkers.sweeps.scheduler import SweepOptions
     from walkers.sweeps.site import load_site
 
@@ -261,7 +261,7 @@ def sweep(
     # The table has the values of the keys that vary.
     origins = next(loaded.cases()).origins
     of_all_points = [origin for origin in origins if origin.key not in loaded.keys]
-    print_lines(lines_of_rest(rests_on(of_all_points)))
+    print_lines(uncertain_value_lines(uncertain_values(of_all_points)))
     return 1 if done.failures else 0
 
 

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from walkers.physics.laws import LAWS
 from walkers.postprocess.measure.numbers import (
-    ASIDE,
+    NOT_SHOWN_ALONE,
     band_of,
     error_text,
     headline,
-    is_of_up,
-    saying_nothing,
+    leaves_out_facing_down,
+    meaningless_numbers,
 )
 from walkers.postprocess.measure.quantities import (
     declared,
@@ -433,7 +433,7 @@ def _uncertain_keys(results: Results) -> set[str]:
 
 def _uncertain_values(results: Results) -> list[dict[str, Any]]:
     """The values with a range on which a result rests."""
-    return [value for value in results.about["rests_on"] if value["range"]]
+    return [value for value in results.about["uncertain_values"] if value["range"]]
 
 
 def _band_text(results: Results) -> str:

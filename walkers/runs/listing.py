@@ -18,7 +18,7 @@ from walkers.errors import InputError, input_error, suggestion
 from walkers.files import read_json
 from walkers.inputs.case_building import stored_case
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.measure.numbers import headline, in_short
+from walkers.postprocess.measure.numbers import headline, short_text
 from walkers.postprocess.measure.results import Results, json_numbers, read_results
 from walkers.rounding import duration_text
 from walkers.runner import run_directory
@@ -197,7 +197,7 @@ def _finished(path: Path, case: str, parameters: FlatCase) -> ListEntry:
         reason = error.problems[0].expected
     else:
         numbers = json_numbers(results)
-        text = in_short(results)
+        text = short_text(results)
         main = headline(results)
         if main != "climbs":
             velocity = numbers.get(main)

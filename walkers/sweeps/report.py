@@ -10,7 +10,7 @@ from typing import Any
 from walkers.errors import InputError
 from walkers.files import write_bytes
 from walkers.postprocess.measure.results import Results
-from walkers.postprocess.measure.uncertainty import lines_of_rest
+from walkers.postprocess.measure.uncertainty import uncertain_value_lines
 from walkers.postprocess.show.report.page import NAME, check_report, fill, page_of, svg_of
 from walkers.sweeps.factors import readable_key
 from walkers.sweeps.figure import figure_of
@@ -56,7 +56,7 @@ def report_sweep(table: SweepTable, path: Path) -> Path:
         points=list(zip(links, cells.to_numpy().tolist(), strict=True)),
         svg=svg,
         left_out=left_out,
-        uncertain="\n".join(lines_of_rest(_uncertain_values(table))),
+        uncertain="\n".join(uncertain_value_lines(_uncertain_values(table))),
         heads=list(cells),
         same=same,
     )
@@ -68,7 +68,7 @@ def _uncertain_values(table: SweepTable) -> list[dict[str, Any]]:
     """The uncertain values of the runs, without those that the sweep varies."""
     values = {}
     for result in table.results.values():
-        for value in result.about["rests_on"]:
+        for value in result.about["uncertain_values"]:
             if value["key"] not in table.frame:
                 values[value["key"]] = value
     return list(values.values())

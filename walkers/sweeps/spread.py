@@ -17,16 +17,16 @@ from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import SweepDefinition, expand
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity
-from walkers.postprocess.measure.numbers import MAIN
+from walkers.postprocess.measure.numbers import MAIN_NUMBERS
 from walkers.postprocess.measure.quantities import declared, unit_shown
 from walkers.postprocess.measure.sides import REST
 from walkers.postprocess.measure.uncertainty import (
     SPREAD_NAME,
     few_draws,
-    held_of,
-    held_text,
-    in_lines,
+    fixed_values,
+    fixed_values_text,
     spread_of,
+    wrapped_lines,
 )
 from walkers.progress import Tell
 from walkers.rounding import counted, rounded
@@ -82,7 +82,7 @@ class Spread:
         Values that were drawn from their ranges.
     held
         Values of the liquid, and unmeasured ones, that have no range
-        (`walkers.postprocess.measure.uncertainty.held_of`).
+        (`walkers.postprocess.measure.uncertainty.fixed_values`).
     bands
         For each main result, by its column in the sweep's table, without walkers that came apart:
         percentiles (``low``, ``median`` and ``high`` for 5, 50 and 95 %), the ``smallest`` and the
@@ -291,7 +291,7 @@ def spread_in(
     return Spread(
         directory=directory,
         varied=tuple(varied),
-        held=held_of(case.origins),
+        held=fixed_values(case.origins),
         bands=bands,
         depends=depends,
         counts=counts,
@@ -357,7 +357,7 @@ def spread_text(spread: Spread) -> str:
     for value in spread.varied:
         ends = " to ".join(map(str, value.range or ()))
         lines.append(f"{_INDENT}{value.key} {value.text} ({ends})")
-    lines += in_lines(f"    fixed    {held_text(spread.held)}")
+    lines += wrapped_lines(f"    fixed    {fixed_values_text(spread.held)}")
     for name, band in spread.bands.items():
         lines.append(f"    {declared(name).label:8} {_band_text(name, band)}")
         lines.append(f"{_INDENT}{_dependence_text(spread, name)}")
@@ -366,7 +366,7 @@ def spread_text(spread: Spread) -> str:
         lines.append(f"    draws    {outcomes}")
     if spread.doubts:
         draws = counted(len(spread.doubts), "draw")
-        lines += in_lines(f"    warning  {draws} with warnings, first: {spread.doubts[0][0]}")
+        lines += wrapped_lines(f"    warning  {draws} with warnings, first: {spread.doubts[0][0]}")
     lines.append(f"    table    {spread.directory}")
     return "\n".join(lines)
 

@@ -26,7 +26,7 @@ import numpy as np
 from walkers.arrays import BoolArray, FloatArray
 from walkers.inputs.tables.run import CONSTANT, RunSettings
 from walkers.postprocess.measure.dump import DumpError
-from walkers.postprocess.measure.motion import Group, between, read_motion
+from walkers.postprocess.measure.motion import Group, interpolated_positions, read_motion
 from walkers.postprocess.measure.sides import REST, STEADY_SPEED
 from walkers.postprocess.measure.tables import Columns
 
@@ -114,7 +114,9 @@ def averages(group: Group) -> Averages:
     opened, begin, interval = [], group.time[:-1], np.diff(group.time)
     work = np.full((len(interval), len(group.walkers)), 0.0 if parts > 1 else np.nan)
     shares = np.linspace(0.0, 1.0, parts + 1).tolist()[1:]
-    looks = chain([group], (replace(group, position=between(group, share)) for share in shares))
+    looks = chain(
+        [group], (replace(group, position=interpolated_positions(group, share)) for share in shares)
+    )
     for part, (before, after) in enumerate(pairwise(looks)):
         opened.append((before.gap[samples] > 0.0).mean(axis=0))
         for direction, course in group.case.excitation.motions(

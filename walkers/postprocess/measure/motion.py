@@ -258,7 +258,7 @@ class Group:
         return np.where(over.any(axis=0), self.time[::strobe][over.argmax(axis=0)], np.nan)
 
 
-def between(moved: Motion | Group, share: float) -> FloatArray:
+def interpolated_positions(moved: Motion | Group, share: float) -> FloatArray:
     """Positions at a fraction of each of the F - 1 intervals between frames, by cubic Hermite interpolation."""
     interval = np.diff(moved.time).reshape(-1, *[1] * (moved.position.ndim - 1))
     begin, end, left = moved.position[:-1], moved.position[1:], 1.0 - share

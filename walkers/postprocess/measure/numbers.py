@@ -46,9 +46,9 @@ class Row:
     error: str = ""
 
 
-MAIN = ("velocity", "right_facing", "axial_velocity", "climbs", "highest", "speed")
+MAIN_NUMBERS = ("velocity", "right_facing", "axial_velocity", "climbs", "highest", "speed")
 """Main numbers, of which a spread measures bands."""
-ASIDE = SHOWN["aside"]
+NOT_SHOWN_ALONE = SHOWN["aside"]
 """Numbers that are not shown by themselves: errors of others, values of the case, conditions."""
 
 
@@ -60,12 +60,12 @@ def headline(numbers: Mapping[str, Any]) -> str:
     """
     if "velocity" not in numbers:
         return "climbs" if "climbs" in numbers else ""
-    if fell(numbers):
+    if not_all_upright(numbers):
         return "axial_velocity"
     return "right_facing" if numbers.get("facings_differ") else "velocity"
 
 
-def fell(numbers: Mapping[str, Any]) -> bool:
+def not_all_upright(numbers: Mapping[str, Any]) -> bool:
     """Whether walkers turned over or lean on a slope: then a velocity along the heading says little about their way."""
     return "upright" in numbers and bool(numbers["upright"] < numbers["walkers"])
 
@@ -92,7 +92,7 @@ def state(numbers: Mapping[str, Any]) -> str:
     return "at rest" if "velocity" in numbers and abs(numbers[headline(numbers)]) < REST else ""
 
 
-def in_short(numbers: Mapping[str, Any]) -> str:
+def short_text(numbers: Mapping[str, Any]) -> str:
     """The state or the main number (`headline`): ``3 climbs``, ``1.080 mm/s``; a dash without walkers and piles."""
     main = headline(numbers)
     if main in ("", "climbs"):
@@ -114,10 +114,10 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
     Numbers that say nothing about any walker are left out: velocities and steadiness of walkers that came apart, means
     over two directions that differ or under a ramp, orientations of walkers of which some turned round.
     """
-    main, hidden = headline(numbers), ASIDE | SHOWN["hidden"]
+    main, hidden = headline(numbers), NOT_SHOWN_ALONE | SHOWN["hidden"]
     if main == "axial_velocity" or (main == "right_facing" and numbers["goes_uphill"]):
         hidden -= {"axial_velocity", "axial_left_facing"}
-    if fell(numbers):
+    if not_all_upright(numbers):
         hidden |= {"right_facing", "left_facing"}
     if not (
         numbers.get("facing_right") and numbers.get("facing_left")
@@ -127,7 +127,7 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
         hidden |= {"velocity"}
     if 0 < numbers.get("turned_round", 0) < numbers.get("walkers", 0):
         hidden |= {"orientation_end"}
-    hidden |= saying_nothing(numbers)
+    hidden |= meaningless_numbers(numbers)
     listed = []
     for name in ordered(numbers.keys() - hidden):
         number = numbers[name]
@@ -142,7 +142,7 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
     return listed
 
 
-def saying_nothing(numbers: Mapping[str, Any]) -> set[str]:
+def meaningless_numbers(numbers: Mapping[str, Any]) -> set[str]:
     """Names of the numbers that say nothing about walkers that came apart or under a ramp."""
     patterns = SHOWN["not_of_a_ramp"] if "stops_at" in numbers else frozenset()
     patterns |= SHOWN["not_of_parts"] if numbers.get("came_apart") else frozenset()
@@ -153,12 +153,12 @@ def _label(quantity: Quantity, numbers: Mapping[str, Any]) -> str:
     """Label of a number: on a slope directions are up and down, and means over those that face up are called so."""
     ground = "slope" if numbers.get("goes_uphill", False) else "level"
     label = LABELS.get(quantity.name, {}).get(ground, quantity.label)
-    if ground == "slope" and is_of_up(quantity, numbers):
+    if ground == "slope" and leaves_out_facing_down(quantity, numbers):
         return f"{label}, facing up"
     return label
 
 
-def is_of_up(quantity: Quantity, numbers: Mapping[str, Any]) -> bool:
+def leaves_out_facing_down(quantity: Quantity, numbers: Mapping[str, Any]) -> bool:
     """Whether a number of a slope leaves out walkers that face down, of which there are some."""
     is_mean_over_up = any(fnmatchcase(quantity.name, pattern) for pattern in SHOWN["facing_up"])
     return bool(numbers["goes_uphill"] and numbers.get("facing_left") and is_mean_over_up)

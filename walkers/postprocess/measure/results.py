@@ -23,9 +23,14 @@ from walkers.postprocess.measure import meetings, piles, record_part, threshold,
 from walkers.postprocess.measure.caption import conditions
 from walkers.postprocess.measure.measuring_module import MeasuringModule
 from walkers.postprocess.measure.motion import read_motion
-from walkers.postprocess.measure.numbers import MAIN, headline, rows, state
+from walkers.postprocess.measure.numbers import MAIN_NUMBERS, headline, rows, state
 from walkers.postprocess.measure.tables import Columns, read_columns, read_table, write_table
-from walkers.postprocess.measure.uncertainty import accuracy_of, bands_of, lines_of_rest, rests_on
+from walkers.postprocess.measure.uncertainty import (
+    accuracy_of,
+    bands_of,
+    uncertain_value_lines,
+    uncertain_values,
+)
 from walkers.rounding import counted, percent
 from walkers.runner.manifest import RESULT_NAME, check_unchanged
 from walkers.runner.run_directory import (
@@ -67,7 +72,7 @@ class Results(dict[str, Any]):
     warnings
         Reasons to doubt the numbers.
     about
-        ``case``, ``drive``, ``rests_on`` (`walkers.postprocess.measure.uncertainty.rests_on`),
+        ``case``, ``drive``, ``rests_on`` (`walkers.postprocess.measure.uncertainty.uncertain_values`),
         ``by_hand`` (notes on a deck that was run by hand), ``deck_edited`` (whether its parameters or
         commands are not those of the program), ``tables`` (their names).
     """
@@ -140,7 +145,7 @@ def measure(directory: Path) -> None:
         "modules": {module.NAME: module.VERSION for module in modules},
         "case": case.name,
         "drive": conditions(case),
-        "rests_on": rests_on(case.origins),
+        "rests_on": uncertain_values(case.origins),
         "by_hand": notes,
         "deck_edited": segment.get("deck_edited", False),
         "tables": list(tables),
@@ -163,7 +168,7 @@ def read_results(directory: str | Path, origins: Sequence[Origin] | None = None)
     about = recorded(directory)
     numbers, warnings = about.pop("numbers"), about.pop("warnings")
     if origins is not None:
-        about["rests_on"] = rests_on(origins)
+        about["rests_on"] = uncertain_values(origins)
     numbers |= bands_of(directory, about["rests_on"], numbers)
     accuracy = accuracy_of(directory)
     numbers |= {
@@ -292,7 +297,7 @@ def text(results: Results, *, cached: bool = False) -> str:
                 for row in table
             ),
             *(f"  warning: {warning}" for warning in results.warnings),
-            *lines_of_rest(results.about["rests_on"]),
+            *uncertain_value_lines(results.about["rests_on"]),
             *banded,
             f"  run        {results.directory}",
         ]
@@ -348,7 +353,7 @@ BAND_NOTE = (
 
 def has_band(results: Mapping[str, Any]) -> bool:
     """Whether a main number of a result has a band."""
-    return any(f"{name}_low" in results for name in MAIN)
+    return any(f"{name}_low" in results for name in MAIN_NUMBERS)
 
 
 def headlines(results: Results) -> list[str]:

@@ -27,7 +27,7 @@ from walkers.postprocess.measure.sides import REST
 NAME = "threshold"
 VERSION = 2
 
-WINDOW = 8
+WINDOW_CYCLES = 8
 """Cycles of a window."""
 _COARSE = 0.3
 """Share of a threshold above which its resolution is told as a doubt."""
@@ -55,8 +55,8 @@ def measure(motion: Motion) -> Measurement:
     """
     case, drive = motion.case, motion.case.excitation
     walked = [distance_walked(group) for group in motion.groups]
-    times = walked[0][0][::WINDOW]
-    whole = np.concatenate([distance[::WINDOW] for _, distance in walked], axis=1)
+    times = walked[0][0][::WINDOW_CYCLES]
+    whole = np.concatenate([distance[::WINDOW_CYCLES] for _, distance in walked], axis=1)
     velocity = np.diff(whole, axis=0) / np.diff(times)[:, None]
     peaks = drive.local_amplitude(times)
     middle = (peaks[1:] + peaks[:-1]) / 2.0
@@ -78,7 +78,7 @@ def measure(motion: Motion) -> Measurement:
     for verb in ("stops", "starts"):
         within = numbers[f"{verb}_within"]
         if within > _COARSE * numbers[f"{verb}_at"]:
-            change = f"{within / ACCELERATION_OF_ONE_G:.2g} g in {WINDOW} cycles"
+            change = f"{within / ACCELERATION_OF_ONE_G:.2g} g in {WINDOW_CYCLES} cycles"
             doubts.append(
                 f"the drive at which a walker {verb} is uncertain: it changes by {change}"
             )

@@ -29,7 +29,7 @@ _LEAST = 6
 _WIDTH = 110
 
 
-def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
+def uncertain_values(origins: Sequence[Origin]) -> list[dict[str, Any]]:
     """Unmeasured values of a case, and values that it calls uncertain.
 
     Each has a ``key``, ``value`` (as in a case file), ``origin`` (``given``, ``library``, ``calibrated``, ``assumed``
@@ -52,8 +52,8 @@ def rests_on(origins: Sequence[Origin]) -> list[dict[str, Any]]:
 _HEADS = ("guessed", "uncertain", "given", "calibrated", "assumed", "library", "own library")
 
 
-def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The uncertain values of a result (`rests_on`) as text, by origin; those of other materials are guessed."""
+def uncertain_value_lines(rests: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The uncertain values of a result (`uncertain_values`) as text, by origin; those of other materials are guessed."""
     listed: dict[str, list[str]] = {}
     for value in rests:
         guess = "guessed" if value["origin"] == "default" else "uncertain"
@@ -62,11 +62,11 @@ def lines_of_rest(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     if "guessed" in listed:
         listed["guessed"][-1] += " (not of these materials and this liquid)"
     texts = [f"  {head:10} {', '.join(listed[head])}" for head in _HEADS if head in listed]
-    return [line for text in texts for line in in_lines(text)]
+    return [line for text in texts for line in wrapped_lines(text)]
 
 
 def guesses(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Values of a result (`rests_on`) that the program guessed, as text: ``friction.bead_wall 0.25``."""
+    """Values of a result (`uncertain_values`) that the program guessed, as text: ``friction.bead_wall 0.25``."""
     return [
         f"{value['key'].partition('.')[2]} {value['value']}"
         for value in rests
@@ -74,12 +74,12 @@ def guesses(rests: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
 
 
-def in_lines(text: str) -> list[str]:
+def wrapped_lines(text: str) -> list[str]:
     """A text beside a head of 13 letters, in lines for a terminal."""
     return textwrap.wrap(text, _WIDTH, subsequent_indent=" " * 13, break_on_hyphens=False)
 
 
-def held_of(origins: Sequence[Origin]) -> tuple[Origin, ...]:
+def fixed_values(origins: Sequence[Origin]) -> tuple[Origin, ...]:
     """Values of a case without a range, which a spread holds fixed: those of the liquid, and other unmeasured ones."""
     keys = {"liquid.name", *OF_LIQUIDS, *unmeasured()}
     return tuple(
@@ -89,8 +89,8 @@ def held_of(origins: Sequence[Origin]) -> tuple[Origin, ...]:
     )
 
 
-def held_text(held: Sequence[Origin]) -> str:
-    """Values that a spread holds fixed (`held_of`), those of the liquid first and with its name."""
+def fixed_values_text(held: Sequence[Origin]) -> str:
+    """Values that a spread holds fixed (`fixed_values`), those of the liquid first and with its name."""
     name = "".join(f" ({value.text})" for value in held if value.key == "liquid.name")
     of_liquid, unknown = (
         ", ".join(f"{value.key} {value.text}" for value in held if value.key in keys)

@@ -21,7 +21,7 @@ from walkers.arrays import FloatArray, IntArray
 from walkers.errors import input_error
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure import piles
-from walkers.postprocess.measure.motion import Motion, between, visible_displacement
+from walkers.postprocess.measure.motion import Motion, interpolated_positions, visible_displacement
 from walkers.postprocess.show.necks import (
     BLUE,
     NO_BRIDGES,
@@ -432,7 +432,7 @@ class Window:
         motion, shift, number = self._scene.motion, np.zeros(3), int(frame)
         place, share, turned = motion.position[number], frame - number, self._scene.turned
         if share:
-            place = between(motion.select(slice(number, number + 2)), share)[0]
+            place = interpolated_positions(motion.select(slice(number, number + 2)), share)[0]
         if self._scene.shaken:
             time = np.interp([frame], np.arange(len(motion.time)), motion.time)
             shift = 1e3 * visible_displacement(motion.case.excitation, time)[0]

@@ -22,7 +22,7 @@ from walkers.postprocess.measure.results import (
     not_computed,
     read_results,
 )
-from walkers.postprocess.measure.uncertainty import held_of, held_text
+from walkers.postprocess.measure.uncertainty import fixed_values, fixed_values_text
 from walkers.postprocess.show.figures import figures_of
 from walkers.postprocess.show.report.page import LARGEST, NAME, check_report, fill, page_of, svg_of
 from walkers.postprocess.show.report.player import MOST_PLACES, player_of
@@ -98,7 +98,7 @@ def report_values(case: Case, results: Results, origins: Origins = None) -> dict
         "rows": rows(results),
         "not_computed": not_computed(results).text,
         "band": BAND_NOTE,
-        "fixed": held_text(held_of(origins)) if banded else "",
+        "fixed": fixed_values_text(fixed_values(origins)) if banded else "",
         "guessed": [parameter for parameter in parameters if parameter["origin"] == "guessed"],
         "uncertain": [
             parameter for parameter in parameters if parameter["origin"].endswith("uncertain")
