@@ -50,7 +50,7 @@ def derived(case: Case) -> dict[str, float]:
 
 def measure(motion: Motion) -> Measurement:
     """Table and numbers; walkers that are joined in the first frame merge at that time."""
-    (centre, heading), run = places_of(motion), motion.case.run
+    (centre, heading), run = centres_and_headings(motion), motion.case.run
     frames = np.array([bridges.frame for bridges in motion.bridges])
     joined, *states = zip(*(_state_of(motion, bridges) for bridges in motion.bridges), strict=True)
     size, held = map(np.array, states)
@@ -89,7 +89,7 @@ def _state_of(
     return frozenset(map(tuple, between.tolist())), np.bincount(labels)[labels], held
 
 
-def places_of(motion: Motion) -> tuple[FloatArray, FloatArray]:
+def centres_and_headings(motion: Motion) -> tuple[FloatArray, FloatArray]:
     """Centres of mass (m) and headings of all walkers in the plane of the floor, shape (F, W, 2)."""
     centre, heading = (np.zeros((len(motion.time), len(motion.walkers), 2)) for _ in range(2))
     for group in map(motion.group, range(len(motion.case.walkers))):

@@ -61,7 +61,7 @@ class Motion:
             Whether the dump ends within a frame; whether the run ended early because its velocities were constant.
         mean_spin : ndarray, shape (F, N, 3), or None
             Angular velocity averaged over the steps since the previous frame (zero in the first frame), if recorded.
-    numbers : ndarray of int, shape (N,), or None
+    bead_numbers : ndarray of int, shape (N,), or None
         Indices of the beads in the run; None: all beads of the run.
     """
 
@@ -77,7 +77,7 @@ class Motion:
     truncated: bool
     ended_early: bool = False
     mean_spin: FloatArray | None = None
-    numbers: IntArray | None = None
+    bead_numbers: IntArray | None = None
 
     def __repr__(self) -> str:
         return f"<Motion of {self.case.name}: {len(self.time)} frames of {len(self.radius)} beads>"
@@ -118,8 +118,10 @@ class Motion:
             for walker in self.walkers
             if place.keys() >= set(walker.beads)
         )
-        numbers = beads if self.numbers is None else self.numbers[beads]
-        return replace(self, **parts, radius=self.radius[beads], numbers=numbers, walkers=walkers)
+        numbers = beads if self.bead_numbers is None else self.bead_numbers[beads]
+        return replace(
+            self, **parts, radius=self.radius[beads], bead_numbers=numbers, walkers=walkers
+        )
 
     def of_walkers(self, walkers: Collection[PlacedWalker]) -> Motion:
         """The motion of the beads of some walkers."""
@@ -510,7 +512,9 @@ def _bridges(
         layout.wall_bridge_columns.index,
     )
     index = np.full(layout.atoms, -1)  # in the motion, which may hold some of the beads
-    index[slice(None) if motion.numbers is None else motion.numbers] = np.arange(len(place))
+    index[slice(None) if motion.bead_numbers is None else motion.bead_numbers] = np.arange(
+        len(place)
+    )
     # The dumps also contain neighbours without a bridge; their force is zero.
     between = between[np.any(between[:, pair("fx") : pair("fx") + 3] != 0.0, axis=1)]
     against = against[np.any(against[:, wall("fx") : wall("fx") + 3] != 0.0, axis=1)]

@@ -124,7 +124,7 @@ def tracks_of(motion: Motion) -> tuple[IntArray, BoolArray]:
     in_motion = motion.time[frame] == members["time"]  # a motion need not have all frames
     track[frame[in_motion], members["bead"][in_motion]] = members["track"][in_motion]
     track = (
-        track if motion.numbers is None else track[:, motion.numbers]
+        track if motion.bead_numbers is None else track[:, motion.bead_numbers]
     )  # a motion need not have all beads
     return track, np.append(climbed, False)[track]
 
