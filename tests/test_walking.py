@@ -519,7 +519,7 @@ def test_the_cost_of_transport_is_that_of_each_kinds_own_mass(run_directory: Run
     cycles = result.table("cycles").set_index("cycle")
     costs = []
     for walker in result.table("walkers").itertuples():
-        mass = 4.0 / 3.0 * np.pi * case.beads.density * np.sum(np.array(radii[walker.kind]) ** 3)
+        mass = 4.0 / 3.0 * np.pi * case.beads.density * np.sum(np.array(radii[walker.make]) ** 3)
         work = cycles["work"][cycles["walker"] == walker.walker][2:6].mean()
         costs.append(80.0 * work / (mass * 9.8 * abs(walker.velocity)))
     assert len(costs) == 2

@@ -1,14 +1,18 @@
-"""Analysis of walkers: velocity, rotation, sliding, orientation.
+"""Measure walkers: velocity, rotation, sliding, contacts, orientation, work of the drive.
 
-The result follows the protocol of the paper: a velocity is the mean over copies, its error bar the largest minus the
-smallest; walkers that start facing left and right are also averaged separately. The copies differ only in how they
-start: their scatter is not an uncertainty of the velocity.
+The numbers follow the protocol of the paper: a velocity is the mean over the copies, and its error
+bar is the largest velocity minus the smallest. The walkers that start facing left and those that
+start facing right are also averaged separately. The copies differ only in how they start, so their
+scatter is not an uncertainty of the velocity.
+
+`walkers.postprocess.measure.gait` computes the quantities of one kind of walkers. This module makes
+tables and numbers of them. Meetings of walkers and thresholds of motion have modules of their own.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import nan
 from typing import Any
 
@@ -37,214 +41,322 @@ NAME = "walking"
 VERSION = 2
 
 _LONGER = 1.5
-"""Cycles of a run in which walkers turn over, over those until they have turned by 90°."""
-_OF_BEADS = ("rotation_", "sliding_", "open_")
+"""Recommended number of cycles over the number after which all turning walkers have turned."""
+_PREFIXES_OF_BEAD_COLUMNS = ("rotation_", "sliding_", "open_")
+"""Starts of the names of columns that belong to a bead or to a contact of the first kind."""
 
 
 def applies(case: Case) -> bool:
-    """Whether a case has walkers."""
+    """Tell whether a case has walkers."""
     return bool(case.walkers)
 
 
 def derived(case: Case) -> dict[str, float]:
-    """Numbers of dimers that follow from the case; of larger clusters the radii of two beads."""
-    first, second = case.walkers[0].radii[:2]
-    radii = {"radius_1": first, "radius_2": second}
-    if len(case.walkers[0].radii) > 2:
-        return radii
-    dimer = dimer_of(case)
-    gamma0 = dimer.gamma0(case.excitation.peak_acceleration)
-    return {
-        "gamma0": gamma0,
-        "sin_delta": dimer.sin_delta,
-        "mass_asymmetry": dimer.mass_asymmetry,
-        **radii,
-    }
+    """Compute the numbers of the first kind of walkers that follow from the case.
+
+    Parameters
+    ----------
+    case
+        A case with walkers.
+
+    Returns
+    -------
+    dict of str to float
+        ``radius_1`` and ``radius_2`` (m) of the first two beads; of dimers also ``gamma0``,
+        ``sin_delta`` and ``mass_asymmetry``.
+    """
+    first_radius, second_radius = case.walkers[0].radii[:2]
+    numbers = {}
+    if len(case.walkers[0].radii) == 2:
+        dimer = dimer_of(case)
+        numbers["gamma0"] = dimer.gamma0(case.excitation.peak_acceleration)
+        numbers["sin_delta"] = dimer.sin_delta
+        numbers["mass_asymmetry"] = dimer.mass_asymmetry
+    numbers["radius_1"] = first_radius
+    numbers["radius_2"] = second_radius
+    return numbers
 
 
 def measure(motion: Motion) -> Measurement:
-    """Tables and numbers of all walkers; rotation, sliding and contacts are those of the first kind."""
-    case, groups = motion.case, motion.groups
-    of_makes = [tables_of(group) for group in groups]
-    tables = {name: _stacked([tables[name] for tables in of_makes]) for name in of_makes[0]}
-    walkers, first = tables["walkers"], of_makes[0]["walkers"]
-    first_up = same_heading(first, uphill=case.goes_uphill)
-    numbers = {
-        **_velocities(walkers, case),
-        **{
-            name: _mean(values[first_up])
-            for name, values in first.items()
-            if name.startswith(_OF_BEADS)
-        },
-        "walkers_met": walkers_met(groups),
-        "meets": case.meets,
-        "cycles": case.run.cycles,
-        "settling_cycles": case.run.settling_cycles,
-        "ended_early": motion.ended_early,
-    }
+    """Measure all walkers of a run.
+
+    Parameters
+    ----------
+    motion
+        Motion of a run with walkers.
+
+    Returns
+    -------
+    Measurement
+        Tables ``trajectory``, ``walkers``, ``cycles`` and ``bridges``, and the numbers of the group
+        ``walking``. Numbers of rotation, sliding and contacts belong to the first kind of walkers.
+    """
+    case = motion.case
+    groups = motion.groups
+    tables_of_kinds = [tables_of(group) for group in groups]
+    tables = {}
+    for name in tables_of_kinds[0]:
+        tables[name] = _stacked([tables_of_kind[name] for tables_of_kind in tables_of_kinds])
+    walkers = tables["walkers"]
+
+    numbers = _velocities(walkers, case)
+    numbers |= _means_of_beads(tables_of_kinds[0]["walkers"], case)
+    numbers["walkers_met"] = walkers_met(groups)
+    numbers["meets"] = case.meets
+    numbers["cycles"] = case.run.cycles
+    numbers["settling_cycles"] = case.run.settling_cycles
+    numbers["ended_early"] = motion.ended_early
     if case.goes_uphill:
         numbers |= _posture(groups, walkers)
     if motion.follows_cycles:
         numbers |= _work(groups, tables["cycles"], walkers)
-    for number, of_make in (
-        enumerate([tables["walkers"] for tables in of_makes], 1) if len(groups) > 1 else ()
-    ):
-        velocity = of_make["velocity"][same_heading(of_make, uphill=case.goes_uphill)]
-        numbers[f"velocity_make_{number}"] = float(velocity.mean())
-        numbers[f"walkers_make_{number}"] = len(of_make["velocity"])
-        numbers[f"steady_make_{number}"] = int(np.sum(of_make["steady"]))
-    doubts = (*_doubts(numbers, changes=case.excitation.changes), *_turning(groups, walkers))
-    return Measurement({**tables, "bridges": _bridges(motion)}, numbers, doubts)
+    if len(groups) > 1:
+        for number, tables_of_kind in enumerate(tables_of_kinds, 1):
+            numbers |= _numbers_of_kind(number, tables_of_kind["walkers"], case)
+
+    warnings = list(_doubts(numbers, changes=case.excitation.changes))
+    turning = _turning_warning(groups, walkers)
+    if turning is not None:
+        warnings.append(turning)
+    return Measurement({**tables, "bridges": _bridges(motion)}, numbers, tuple(warnings))
 
 
-def _doubts(numbers: Mapping[str, Any], *, changes: bool) -> Iterable[str]:
-    """Reasons to doubt the velocity; on trays walkers stop, and the drive may change."""
-    lacking = numbers["walkers"] - numbers["steady"]
-    if lacking and not (numbers["meets"] or numbers["came_apart"] or changes):
-        unsteady = f"{lacking} of {numbers['walkers']} walkers {'is' if lacking == 1 else 'are'} not steady"
-        yield f"{unsteady}: the velocity depends on the length of the run"
+def _means_of_beads(walkers: Columns, case: Case) -> dict[str, float]:
+    """Mean rotation, sliding and open contacts of walkers of one kind, by names of columns."""
+    averaged = same_heading(walkers, uphill=case.goes_uphill)
+    numbers = {}
+    for name, values in walkers.items():
+        if name.startswith(_PREFIXES_OF_BEAD_COLUMNS):
+            numbers[name] = _mean(values[averaged])
+    return numbers
+
+
+def _numbers_of_kind(number: int, walkers: Columns, case: Case) -> dict[str, float]:
+    """Velocity and counts of one kind of walkers, which has this number, from 1."""
+    velocity = walkers["velocity"][same_heading(walkers, uphill=case.goes_uphill)]
+    return {
+        f"velocity_make_{number}": float(velocity.mean()),
+        f"walkers_make_{number}": len(walkers["velocity"]),
+        f"steady_make_{number}": int(np.sum(walkers["steady"])),
+    }
+
+
+def _doubts(numbers: Mapping[str, Any], *, changes: bool) -> Iterator[str]:
+    """Reasons to doubt the velocity.
+
+    Walkers on trays stop when they meet, and a drive whose strength ``changes`` changes their
+    velocity: neither is a reason to doubt.
+    """
+    unsteady = numbers["walkers"] - numbers["steady"]
+    if unsteady and not (numbers["meets"] or numbers["came_apart"] or changes):
+        verb = "is" if unsteady == 1 else "are"
+        yield (
+            f"{unsteady} of {numbers['walkers']} walkers {verb} not steady: "
+            "the velocity depends on the length of the run"
+        )
     if numbers["came_apart"]:
         share = percent(round(numbers["separated_fraction"], 2))
         yield f"walkers came apart: beads are beyond the rupture distance for {share} of the time"
     if numbers["depends_on_start"] and not changes:
-        yield f"steady copies differ by more than {percent(SAME)}: the velocity depends on the start"
+        difference = f"steady copies differ by more than {percent(SAME)}"
+        yield f"{difference}: the velocity depends on the start"
     if numbers["walkers_met"] and not numbers["meets"]:
         yield "walkers came close to each other and are not independent: increase the spacing"
 
 
-def _turning(groups: Sequence[Group], walkers: Columns) -> Iterable[str]:
-    """A warning if walkers turn away from the drive axis, or will turn over on a slope, but have not yet."""
+def _turning_warning(groups: Sequence[Group], walkers: Columns) -> str | None:
+    """A warning if walkers will turn away from the drive axis, or turn over, after the run."""
     case = groups[0].case
+    if case.meets or case.excitation.changes:
+        return None
     not_turned = np.isnan(walkers["turned_at"])
-    left = np.concatenate([gait.turns_away_after(group) for group in groups])[not_turned]
-    if (count := int(np.isfinite(left).sum())) and not (case.meets or case.excitation.changes):
-        seconds = float(np.nanmax(left))
-        cycles = float(f"{_LONGER * (case.run.cycles + case.excitation.frequency * seconds):.2g}")
-        turn = f"{count} of {counted(len(walkers['walker']), 'walker')} {'turns' if count == 1 else 'turn'}"
-        away = f"{turn} away from the drive axis faster and faster, by 45° after about {seconds:.2g} s more"
-        small = int(
-            np.concatenate([gait.small_angles_grow(group) for group in groups])[not_turned].sum()
+    seconds_left = np.concatenate([gait.turns_away_after(group) for group in groups])[not_turned]
+    count = int(np.isfinite(seconds_left).sum())
+    if count == 0:
+        return None
+    longest = float(np.nanmax(seconds_left))
+    cycles_to_turn = case.run.cycles + case.excitation.frequency * longest
+    recommended_cycles = float(f"{_LONGER * cycles_to_turn:.2g}")
+
+    verb = "turns" if count == 1 else "turn"
+    subject = f"{count} of {counted(len(walkers['walker']), 'walker')} {verb}"
+    if case.boundary.tilt:
+        event = f"{subject} faster and faster and will turn over after the end of the run"
+    else:
+        event = (
+            f"{subject} away from the drive axis faster and faster, "
+            f"by 45° after about {longest:.2g} s more"
         )
+        grow = np.concatenate([gait.small_angles_grow(group) for group in groups])
+        small = int(grow[not_turned].sum())
         if small == 1:
-            away += "; the small angle of 1 other grows too"
+            event += "; the small angle of 1 other grows too"
         elif small:
-            away += f"; the small angles of {small} others grow too"
-        if case.boundary.tilt:
-            away = f"{turn} faster and faster and will turn over after the end of the run"
-        yield f"{away}: set run.cycles = {cycles:.0f}"
+            event += f"; the small angles of {small} others grow too"
+    return f"{event}: set run.cycles = {recommended_cycles:.0f}"
 
 
 def _stacked(parts: Sequence[Columns]) -> Columns:
-    """Concatenated tables; missing columns are NaN."""
-    lengths = [len(part["walker"]) for part in parts]
-    keys = dict.fromkeys(key for part in parts for key in part)
-    return {
-        key: np.concatenate(
-            [part.get(key, np.full(rows, nan)) for part, rows in zip(parts, lengths, strict=True)]
-        )
-        for key in keys
-    }
+    """Concatenate tables of several kinds of walkers; columns that a kind does not have are NaN."""
+    names = dict.fromkeys(name for part in parts for name in part)
+    stacked = {}
+    for name in names:
+        columns = []
+        for part in parts:
+            missing = np.full(len(part["walker"]), nan)
+            columns.append(part.get(name, missing))
+        stacked[name] = np.concatenate(columns)
+    return stacked
 
 
 def tables_of(group: Group) -> dict[str, Columns]:
-    """Tables ``trajectory``, ``walkers`` and ``cycles`` of the walkers of one kind, one walker after the other."""
-    run, seen, mean = group.case.run, gait.gait(group), gait.averages(group)
-    samples, beads = gait.settled_samples(run), len(group.radii)
-    reach = np.array([load.rupture for load in contact_loads(group.case, group.kind)[beads:]])
+    """Make the tables of the walkers of one kind.
+
+    Parameters
+    ----------
+    group
+        Walkers of one kind.
+
+    Returns
+    -------
+    dict of str to columns
+        The tables ``trajectory`` (a row per walker and frame), ``walkers`` (a row per walker) and
+        ``cycles`` (a row per walker and cycle), sorted by walker.
+    """
+    averages = gait.averages(group)
+    return {
+        "trajectory": _trajectory_table(group),
+        "walkers": _walkers_table(group, averages),
+        "cycles": _cycles_table(group, averages),
+    }
+
+
+def _trajectory_table(group: Group) -> Columns:
+    """Table ``trajectory``: place, orientation and velocities of walkers in each frame."""
+    beads = len(group.radii)
+    course = gait.gait(group)
+    x, y, z = np.moveaxis(group.mass_centre, -1, 0)
+    columns = {
+        "time": group.time,
+        "cycle": group.time * group.case.excitation.frequency,
+        "x": x,
+        "y": y,
+        "z": z,
+        "orientation": group.orientation,
+        "velocity": course.velocity,
+    }
+    columns |= numbered_columns("rotation", course.rotation)
+    columns |= _columns_of_contacts("sliding", course.sliding, beads)
+    columns |= _columns_of_contacts("gap", group.gap, beads)
+    return _one_walker_after_another(group, columns)
+
+
+def _walkers_table(group: Group, averages: gait.Averages) -> Columns:
+    """Table ``walkers``: the start of each walker, and means over the cycles after settling."""
     placed = group.walkers
-    walkers = {
+    beads = len(group.radii)
+    samples = gait.settled_samples(group.case.run)
+    loads_of_pairs = contact_loads(group.case, group.kind)[beads:]
+    rupture_distance = np.array([load.rupture for load in loads_of_pairs])
+    separated = (group.gap[samples, :, beads:] > rupture_distance).any(axis=-1)
+    columns = {
         "walker": np.array([walker.walker for walker in placed]),
         "make": np.array([walker.kind for walker in placed]),
         "facing": np.array([walker.facing for walker in placed]),
         "start_angle": np.array([walker.start_angle for walker in placed]),
-        **gait.measure_walk(group),
+    }
+    columns |= gait.measure_walk(group)
+    columns |= {
         "orientation_mean": group.orientation[samples].mean(axis=0),
         "orientation_end": group.orientation[-1],
         "turned_at": group.turned_at,
-        "separated_fraction": (group.gap[samples, :, beads:] > reach).any(axis=-1).mean(axis=0),
-        **numbered_columns("rotation", mean.rotation),
-        **_by_kind(beads, sliding=mean.sliding, open=mean.open),
+        "separated_fraction": separated.mean(axis=0),
     }
-    along = {
-        "time": group.time,
-        "cycle": group.time * group.case.excitation.frequency,
-        **dict(zip("xyz", np.moveaxis(group.mass_centre, -1, 0), strict=True)),
-        "orientation": group.orientation,
-        "velocity": seen.velocity,
-        **numbered_columns("rotation", seen.rotation),
-        **_by_kind(beads, sliding=seen.sliding, gap=group.gap),
-    }
-    strobe = run.samples_per_cycle
+    columns |= numbered_columns("rotation", averages.rotation)
+    columns |= _columns_of_contacts("sliding", averages.sliding, beads)
+    columns |= _columns_of_contacts("open", averages.open, beads)
+    return columns
+
+
+def _cycles_table(group: Group, averages: gait.Averages) -> Columns:
+    """Table ``cycles``: place and orientation at the start of each cycle, and the work in it."""
+    run = group.case.run
+    frames_per_cycle = run.samples_per_cycle
     time, distance = gait.distance_walked(group)
-    displacement = group.mass_centre[::strobe] - group.mass_centre[0]
+    displacement = group.mass_centre[::frames_per_cycle] - group.mass_centre[0]
     work = np.full(distance.shape, nan)
-    work[: len(mean.work)] = mean.work
-    cycles = {
+    work[: len(averages.work)] = averages.work
+    columns = {
         "cycle": np.arange(len(time)) * run.cycles_per_sample,
         "time": time,
         "distance": distance,
         "along": displacement @ group.drive_axis,
         "across": displacement @ group.across_axis,
-        "orientation": group.orientation[::strobe],
+        "orientation": group.orientation[::frames_per_cycle],
         "work": work,
     }
-    return {
-        "trajectory": _of_frames(group, along),
-        "walkers": walkers,
-        "cycles": _of_frames(group, cycles),
-    }
+    return _one_walker_after_another(group, columns)
 
 
-def _of_frames(group: Group, columns: Columns) -> Columns:
-    """Columns of values in F frames, shape (F,) or (F, W), one walker after the other."""
-    number, shape = (
-        [walker.walker for walker in group.walkers],
-        (len(next(iter(columns.values()))), len(group.walkers)),
-    )
-    wide = {"walker": np.broadcast_to(number, shape)} | {
-        name: values if values.ndim > 1 else np.broadcast_to(values[:, None], shape)
-        for name, values in columns.items()
-    }
-    return {name: values.T.reshape(-1) for name, values in wide.items()}
+def _one_walker_after_another(group: Group, columns: Columns) -> Columns:
+    """Flatten columns of shape (F,) or (F, W) to F rows for each walker; add ``walker``."""
+    frames = len(next(iter(columns.values())))
+    shape = (frames, len(group.walkers))
+    numbers = [walker.walker for walker in group.walkers]
+    rows = {"walker": np.broadcast_to(numbers, shape).T.reshape(-1)}
+    for name, values in columns.items():
+        wide = values if values.ndim > 1 else np.broadcast_to(values[:, None], shape)
+        rows[name] = wide.T.reshape(-1)
+    return rows
 
 
-def _by_kind(beads: int, **contacts: FloatArray) -> Columns:
-    """Columns of values at contacts (as in `gait.Gait`): of beads with walls, and ``…_pair_…`` of pairs of beads."""
-    columns: Columns = {}
-    for name, values in contacts.items():
-        columns |= numbered_columns(name, values[..., :beads]) | numbered_columns(
-            f"{name}_pair", values[..., beads:]
-        )
+def _columns_of_contacts(name: str, values: FloatArray, beads: int) -> Columns:
+    """Columns of values at contacts: the last axis has those of the beads, then of the pairs.
+
+    Contacts of beads with walls have the columns ``name_1``, ``name_2``, …, contacts of pairs of
+    beads ``name_pair_1``, ``name_pair_2``, ….
+    """
+    columns = numbered_columns(name, values[..., :beads])
+    columns |= numbered_columns(f"{name}_pair", values[..., beads:])
     return columns
 
 
 def _bridges(motion: Motion) -> Columns:
-    """Rows sorted by time, walker and contact; in a frame bridges between beads are before those to walls."""
-    contact_of: dict[tuple[int, int], int] = {}  # by two beads, or by a bead and −1 for a wall
-    for walker in motion.walkers:
-        touching = [(bead, -1) for bead in walker.beads]
-        pairs = motion.case.walkers[walker.kind].pairs
-        touching += [(walker.beads[lower], walker.beads[upper]) for lower, upper in pairs]
-        contact_of |= {ends: number for number, ends in enumerate(touching, 1)}
-    parts = [
-        {"frame": np.full(len(bridges), bridges.frame), **bridges.rows()}
-        for bridges in motion.bridges
-    ]
-    rows = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    first, second = rows["bead_1"], rows["bead_2"]
-    owner = motion.walker_of[first]
-    joined = np.where(second >= 0, motion.walker_of[second], owner)
+    """Table ``bridges``: its rows are sorted by time, walker, contact and second bead."""
+    contact_numbers = _contact_numbers(motion)
+    parts = []
+    for bridges in motion.bridges:
+        frames = np.full(len(bridges), bridges.frame)
+        parts.append({"frame": frames, **bridges.rows()})
+    rows = {}
+    for name in parts[0]:
+        rows[name] = np.concatenate([part[name] for part in parts])
+    frame = rows.pop("frame")
+    first = rows["bead_1"]
+    second = rows["bead_2"]
+    contacts = zip(first.tolist(), second.tolist(), strict=True)
+    walker = motion.walker_of[first]
+    second_walker = np.where(second >= 0, motion.walker_of[second], walker)
     columns = {
-        "time": motion.time[rows.pop("frame")],
-        "walker": owner,
-        "contact": np.array(
-            [contact_of.get(ends, 0) for ends in zip(first.tolist(), second.tolist(), strict=True)]
-        ),
-        "other_walker": np.where(joined == owner, -1, joined),
-        **rows,
+        "time": motion.time[frame],
+        "walker": walker,
+        "contact": np.array([contact_numbers.get(contact, 0) for contact in contacts]),
+        "other_walker": np.where(second_walker == walker, -1, second_walker),
     }
+    columns |= rows
     order = np.lexsort([columns[name] for name in ("bead_2", "contact", "walker", "time")])
     return {name: values[order] for name, values in columns.items()}
+
+
+def _contact_numbers(motion: Motion) -> dict[tuple[int, int], int]:
+    """Number of each contact within its walker, from 1, by its beads; a wall is the bead −1."""
+    numbers: dict[tuple[int, int], int] = {}
+    for walker in motion.walkers:
+        contacts = [(bead, -1) for bead in walker.beads]
+        pairs = motion.case.walkers[walker.kind].pairs
+        contacts += [(walker.beads[lower], walker.beads[upper]) for lower, upper in pairs]
+        numbers |= {contact: number for number, contact in enumerate(contacts, 1)}
+    return numbers
 
 
 def _mean(values: FloatArray) -> float:
@@ -259,30 +371,32 @@ def _scatter(values: FloatArray) -> float:
 
 
 def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
-    velocity, axial, end = (
-        walkers["velocity"],
-        walkers["axial_velocity"],
-        walkers["orientation_end"],
-    )
+    """Velocities (m/s), orientations (rad) and counts of all walkers in a table ``walkers``."""
+    velocity = walkers["velocity"]
+    axial = walkers["axial_velocity"]
+    end = walkers["orientation_end"]
     facing = sides(walkers["facing"], walkers["start_angle"])
-    right, left = facing > 0, facing < 0
-    meant = velocity[same_heading(walkers, uphill=case.goes_uphill)]
+    right = facing > 0
+    left = facing < 0
+    averaged = same_heading(walkers, uphill=case.goes_uphill)
+    averaged_velocity = velocity[averaged]
+    # In a mean over both headings, velocities along the drive axis cancel. On a tray they should.
+    averaged_axial = axial[same_heading(walkers, uphill=case.goes_uphill or not case.meets)]
+    right_facing = _mean(velocity[right])
+    left_facing = _mean(velocity[left])
     separated = _mean(walkers["separated_fraction"])
     # On trays the means include walkers that stopped; by symmetry, both headings are one.
     one_heading = case.meets or _is_symmetric(case)
-    facings = _mean(velocity[right]), _mean(velocity[left])
     return {
-        "velocity": float(meant.mean()),
-        "scatter": _scatter(meant),
-        "smallest": float(meant.min()),
-        "largest": float(meant.max()),
-        "right_facing": facings[0],
-        "left_facing": facings[1],
+        "velocity": float(averaged_velocity.mean()),
+        "scatter": _scatter(averaged_velocity),
+        "smallest": float(averaged_velocity.min()),
+        "largest": float(averaged_velocity.max()),
+        "right_facing": right_facing,
+        "left_facing": left_facing,
         "right_scatter": _scatter(velocity[right]),
         "left_scatter": _scatter(velocity[left]),
-        "axial_velocity": _mean(
-            axial[same_heading(walkers, uphill=case.goes_uphill or not case.meets)]
-        ),
+        "axial_velocity": _mean(averaged_axial),
         "axial_left_facing": _mean(axial[left]),
         "lateral_velocity": _mean(walkers["lateral_velocity"]),
         "separated_fraction": separated,
@@ -296,27 +410,45 @@ def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
         "turned_round": int(np.sum(np.isfinite(walkers["turned_at"]))),
         "depends_on_start": _depends_on_start(walkers, facing, case),
         "came_apart": separated > SEPARATED and not case.meets,
-        "facings_differ": not one_heading and differ(*facings),
+        "facings_differ": not one_heading and differ(right_facing, left_facing),
     }
 
 
 def _work(groups: Sequence[Group], cycles: Columns, walkers: Columns) -> dict[str, float]:
-    """Mean work of the drive per cycle, and cost of transport f W / (M g |v|) with the velocity v along the heading.
+    """Mean work of the drive per cycle, and the cost of transport.
 
-    The cost is the power of the drive over the power of lifting the walker as fast as it walks; walkers that hardly
-    walk have none.
+    The cost is f W / (M g |v|), with the work W per cycle, the frequency f, the mass M and the
+    velocity v along the heading. It is the power of the drive over the power of lifting the walker
+    as fast as it walks. Walkers that hardly walk have none.
+
+    Parameters
+    ----------
+    groups
+        The walkers of each kind.
+    cycles, walkers
+        The tables ``cycles`` and ``walkers`` of all kinds.
+
+    Returns
+    -------
+    dict of str to float
+        ``work`` (J) and ``cost_of_transport``, means over the walkers that `same_heading` chooses.
     """
     case = groups[0].case
-    of_cycles = np.ascontiguousarray(cycles["work"].reshape(len(walkers["walker"]), -1).T)
-    work, speed = of_cycles[case.run.settled_strobes : -1].mean(axis=0), np.abs(walkers["velocity"])
+    work_of_cycles = cycles["work"].reshape(len(walkers["walker"]), -1).T
+    settled_work = np.ascontiguousarray(work_of_cycles)[case.run.settled_strobes : -1]
+    work = settled_work.mean(axis=0)
+    speed = np.abs(walkers["velocity"])
     speed = np.where(speed < STEADY_SPEED, nan, speed)
-    mass = np.array([gait.mass_of(group) for group in groups])[walkers["make"]]
-    lifted = mass * ACCELERATION_OF_ONE_G * speed / case.excitation.frequency
-    meant = same_heading(walkers, uphill=case.goes_uphill)
-    return {"work": _mean(work[meant]), "cost_of_transport": _mean((work / lifted)[meant])}
+    mass_of_kinds = np.array([gait.mass_of(group) for group in groups])
+    mass = mass_of_kinds[walkers["make"]]
+    lifting_work = mass * ACCELERATION_OF_ONE_G * speed / case.excitation.frequency
+    cost = work / lifting_work
+    averaged = same_heading(walkers, uphill=case.goes_uphill)
+    return {"work": _mean(work[averaged]), "cost_of_transport": _mean(cost[averaged])}
 
 
 def _is_symmetric(case: Case) -> bool:
+    """Tell whether both directions along the drive axis are the same for boundary and drive."""
     drive = case.excitation
     return (
         not case.boundary.tilt
@@ -326,40 +458,59 @@ def _is_symmetric(case: Case) -> bool:
 
 
 def _depends_on_start(walkers: Columns, facing: IntArray, case: Case) -> bool:
-    """Whether steady walkers of one kind differ; both directions are one if boundary and drive are symmetric."""
-    kept = (
-        walkers["steady"]
-        & np.isnan(walkers["turned_at"])
-        & (walkers["separated_fraction"] < SEPARATED)
-    )
-    kind = 2 * walkers["make"] + (0 if _is_symmetric(case) else facing > 0)
-    velocities = (
-        walkers["velocity"][kept & (kind == number)] for number in set(kind[kept].tolist())
-    )
-    return not case.meets and any(
-        differ(float(same_heading.min()), float(same_heading.max())) for same_heading in velocities
-    )
+    """Tell whether steady walkers of one kind differ in their velocities.
+
+    Only walkers of one heading are compared, unless boundary and drive are symmetric. Walkers that
+    turned round or came apart do not count.
+    """
+    if case.meets:
+        return False
+    stayed_together = walkers["separated_fraction"] < SEPARATED
+    compared = walkers["steady"] & np.isnan(walkers["turned_at"]) & stayed_together
+    class_of_walker = 2 * walkers["make"]
+    if not _is_symmetric(case):
+        class_of_walker = class_of_walker + (facing > 0)
+    for number in set(class_of_walker[compared].tolist()):
+        velocity = walkers["velocity"][compared & (class_of_walker == number)]
+        if differ(float(velocity.min()), float(velocity.max())):
+            return True
+    return False
 
 
 def _posture(groups: Iterable[Group], walkers: Columns) -> dict[str, Any]:
-    """Numbers of walkers by posture and way, times of turning over (s), largest final angle of the others (rad)."""
-    counts = Counter(posture for group in groups for posture in gait.postures(group))
-    turned_at, end = walkers["turned_at"], np.abs(walkers["orientation_end"])
+    """Count the walkers on a slope by posture and by direction, and give the times of turning over.
+
+    ``turned_first`` and ``turned_last`` are in s. ``ends_within`` (rad) is the largest final angle
+    of the walkers that did not turn over.
+    """
+    counts: Counter[str] = Counter()
+    for group in groups:
+        counts.update(gait.postures(group))
     uphill = walkers["axial_velocity"]
-    over, kept = turned_at[np.isfinite(turned_at)], end[np.isnan(turned_at)]
+    turned_at = walkers["turned_at"]
+    turning_times = turned_at[np.isfinite(turned_at)]
+    final_angles = np.abs(walkers["orientation_end"])[np.isnan(turned_at)]
     return {
-        **{name: counts[name] for name in ("upright", "leaning", "turned_over")},
+        "upright": counts["upright"],
+        "leaning": counts["leaning"],
+        "turned_over": counts["turned_over"],
         "climbing": int(np.sum(uphill > REST)),
         "descending": int(np.sum(uphill < -REST)),
-        "turned_first": float(min(over, default=nan)),
-        "turned_last": float(max(over, default=nan)),
-        "ends_within": float(max(kept, default=nan)),
+        "turned_first": float(min(turning_times, default=nan)),
+        "turned_last": float(max(turning_times, default=nan)),
+        "ends_within": float(max(final_angles, default=nan)),
     }
 
 
 def walkers_met(groups: Sequence[Group]) -> bool:
-    """Whether two walkers came so close that they are not independent."""
-    centres = [group.mass_centre[:: group.case.run.samples_per_cycle, :, :2] for group in groups]
-    return came_near(
-        np.concatenate(centres, axis=1), NEAR * max(group.kind.length for group in groups)
-    )
+    """Tell whether two walkers came so close to each other that they are not independent.
+
+    Parameters
+    ----------
+    groups
+        The walkers of each kind. Their centres of mass are compared once per cycle.
+    """
+    frames_per_cycle = groups[0].case.run.samples_per_cycle
+    centres = [group.mass_centre[::frames_per_cycle, :, :2] for group in groups]
+    longest = max(group.kind.length for group in groups)
+    return came_near(np.concatenate(centres, axis=1), NEAR * longest)
