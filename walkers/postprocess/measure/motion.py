@@ -1,10 +1,14 @@
-"""The motion of a run's beads and their bridges, over all of its segments, as arrays."""
+"""The motion of a run's beads and their bridges, over all of its segments, as arrays.
+
+`read_motion` reads a run directory. This module does not measure: it gives positions, velocities,
+headings, gaps and bridges, from which the other modules of this package compute tables and numbers.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -33,36 +37,40 @@ LEAST_SAMPLES = 8
 """Smallest number of samples per cycle that resolves the motion within a cycle."""
 NEAR = 1.5
 """Walkers whose centres of mass come closer than this multiple of their length have met."""
-_OF_BEADS = ("position", "velocity", "spin", "mean_spin")
-_OF_FRAMES = (*_OF_BEADS, "time", "substrate", "frames")
 
 
 @dataclass(frozen=True, repr=False)
 class Motion:
-    """Positions and velocities relative to the boundary; F frames of N beads, SI units.
+    """Positions and velocities relative to the boundary: F frames of N beads, SI units.
 
     Attributes
     ----------
-        case
-            The case; if the run ended at constant velocities, with the cycles that it took.
-        time : ndarray, shape (F,)
-            Time since the start of the drive, s; negative while the beads come to rest.
-        position, velocity, spin : ndarray, shape (F, N, 3)
-            Position and velocity of the centres; angular velocity, rad/s.
-        substrate : ndarray, shape (F, 3)
-            Displacement of the boundary in the laboratory, for both frames of the drive, m; of a record, without its
-            slow part (`walkers.inputs.records.record.Record.slow_course`).
-        radius : ndarray, shape (N,)
-        walkers
-            The walkers with the indices of their beads, from 0.
-        frames : list of (Path, int)
-            Segment of each frame and its number there, for the bridges.
-        truncated, ended_early
-            Whether the dump ends within a frame; whether the run ended early because its velocities were constant.
-        mean_spin : ndarray, shape (F, N, 3), or None
-            Angular velocity averaged over the steps since the previous frame (zero in the first frame), if recorded.
+    case
+        The case; if the run ended at constant velocities, with the cycles that it took.
+    time : ndarray, shape (F,)
+        Time since the start of the drive, s; negative while the beads come to rest.
+    position, velocity : ndarray, shape (F, N, 3)
+        Position (m) and velocity (m/s) of the centres of the beads.
+    spin : ndarray, shape (F, N, 3)
+        Angular velocity of the beads, rad/s.
+    substrate : ndarray, shape (F, 3)
+        Displacement of the boundary in the laboratory, for both frames of reference, m; of a
+        record, without its slow part (`walkers.inputs.records.record.Record.slow_course`).
+    radius : ndarray, shape (N,)
+        Radius of the beads, m.
+    walkers
+        The walkers with the indices of their beads, from 0.
+    frames : list of (Path, int)
+        Segment of each frame and number of the frame in it, by which bridges are found.
+    truncated
+        Whether the dump ends within a frame.
+    ended_early
+        Whether the run ended early because its velocities were constant.
+    mean_spin : ndarray, shape (F, N, 3), or None
+        Angular velocity averaged over the steps since the previous frame, rad/s; zero in the first
+        frame, None if it was not recorded.
     bead_numbers : ndarray of int, shape (N,), or None
-        Indices of the beads in the run; None: all beads of the run.
+        Indices of the beads in the run; None if the motion has all beads of the run.
     """
 
     case: Case
@@ -85,7 +93,8 @@ class Motion:
     @property
     def directory(self) -> Path:
         """The run directory."""
-        return run_of_segment(self.frames[0][0])
+        segment, _ = self.frames[0]
+        return run_of_segment(segment)
 
     @property
     def first_driven(self) -> int:
@@ -100,46 +109,76 @@ class Motion:
     @property
     def driven(self) -> Motion:
         """The motion during the drive."""
-        return self.select(slice(self.first_driven, None)) if self.first_driven else self
+        if self.first_driven == 0:
+            return self
+        return self.select(slice(self.first_driven, None))
 
-    def select(
-        self, frames: slice = slice(None), beads: IntArray | None = None, **changes: Any
-    ) -> Motion:
-        """The motion of selected frames and beads, with changes; beads are renumbered, walkers are not."""
-        parts = {
-            name: part[frames] for name in _OF_FRAMES if (part := getattr(self, name)) is not None
-        } | changes
-        if beads is None:
-            return replace(self, **parts)
-        parts |= {name: part[:, beads] for name, part in parts.items() if name in _OF_BEADS}
-        place = {bead: number for number, bead in enumerate(beads.tolist())}
-        walkers = tuple(
-            replace(walker, beads=tuple(place[bead] for bead in walker.beads))
-            for walker in self.walkers
-            if place.keys() >= set(walker.beads)
+    def select(self, frames: slice = slice(None), beads: IntArray | None = None) -> Motion:
+        """Select frames and beads.
+
+        Parameters
+        ----------
+        frames
+            The frames to keep.
+        beads : ndarray of int, or None
+            Indices of the beads to keep, in their new order; None keeps all.
+
+        Returns
+        -------
+        Motion
+            The motion of these frames and beads. Beads are renumbered in this order. Walkers keep
+            their numbers; those that lose a bead are left out.
+        """
+        selected = replace(
+            self,
+            time=self.time[frames],
+            position=self.position[frames],
+            velocity=self.velocity[frames],
+            spin=self.spin[frames],
+            substrate=self.substrate[frames],
+            frames=self.frames[frames],
+            mean_spin=None if self.mean_spin is None else self.mean_spin[frames],
         )
-        numbers = beads if self.bead_numbers is None else self.bead_numbers[beads]
+        return selected if beads is None else selected._with_beads(beads)
+
+    def _with_beads(self, beads: IntArray) -> Motion:
+        """The motion of some beads, which are renumbered."""
+        new_number = {bead: number for number, bead in enumerate(beads.tolist())}
+        walkers = []
+        for walker in self.walkers:
+            if new_number.keys() >= set(walker.beads):
+                renumbered = tuple(new_number[bead] for bead in walker.beads)
+                walkers.append(replace(walker, beads=renumbered))
         return replace(
-            self, **parts, radius=self.radius[beads], bead_numbers=numbers, walkers=walkers
+            self,
+            position=self.position[:, beads],
+            velocity=self.velocity[:, beads],
+            spin=self.spin[:, beads],
+            radius=self.radius[beads],
+            walkers=tuple(walkers),
+            mean_spin=None if self.mean_spin is None else self.mean_spin[:, beads],
+            bead_numbers=beads if self.bead_numbers is None else self.bead_numbers[beads],
         )
 
     def of_walkers(self, walkers: Collection[PlacedWalker]) -> Motion:
         """The motion of the beads of some walkers."""
-        return self.select(beads=np.array([bead for walker in walkers for bead in walker.beads]))
+        return self.select(beads=np.concatenate([walker.beads for walker in walkers]))
 
     @property
     def averaged(self) -> Motion:
         """Means over the F - 1 intervals between frames: positions, velocities and spins.
 
-        Velocities are displacements over time, the average over all steps. Spins are those that the engine averaged, if
-        any, otherwise the mean of both ends.
+        Velocities are displacements over time, the average over all steps. Spins are those that the
+        engine averaged, if it did; otherwise they are the mean of both ends of the interval.
         """
-        spin = (
-            (self.spin[1:] + self.spin[:-1]) / 2.0 if self.mean_spin is None else self.mean_spin[1:]
-        )
+        if self.mean_spin is None:
+            spin = (self.spin[1:] + self.spin[:-1]) / 2.0
+        else:
+            spin = self.mean_spin[1:]
         position = (self.position[1:] + self.position[:-1]) / 2.0
         velocity = np.diff(self.position, axis=0) / np.diff(self.time)[:, None, None]
-        return self.select(slice(1, None), position=position, velocity=velocity, spin=spin)
+        intervals = self.select(slice(1, None))
+        return replace(intervals, position=position, velocity=velocity, spin=spin)
 
     @property
     def large(self) -> BoolArray:
@@ -156,28 +195,57 @@ class Motion:
 
     @cached_property
     def bridges(self) -> list[Bridges]:
-        """The bridges of all frames of `read_bridges`; those of piles are read one frame after the other."""
+        """The bridges of all frames that recorded them; `read_bridges` needs less memory."""
         return list(read_bridges(self))
 
     @cached_property
     def groups(self) -> list[Group]:
-        """The walkers by kind, during the drive."""
+        """The walkers of each kind during the drive, in the order of the kinds of the case."""
         return [self.driven.group(number) for number in range(len(self.case.walkers))]
 
     def group(self, number: int) -> Group:
-        """The walkers of a kind, in all frames."""
+        """The walkers of one kind in all frames.
+
+        Parameters
+        ----------
+        number
+            Index of the kind in the case, from 0.
+        """
         walkers = [walker for walker in self.walkers if walker.kind == number]
         rows = np.array([walker.beads for walker in walkers], dtype=np.int64)
-        moved = (array[:, rows] for array in (self.position, self.velocity, self.spin))
-        return Group(self, self.case, self.case.walkers[number], walkers, rows, self.time, *moved)
+        return Group(
+            motion=self,
+            case=self.case,
+            kind=self.case.walkers[number],
+            walkers=walkers,
+            rows=rows,
+            time=self.time,
+            position=self.position[:, rows],
+            velocity=self.velocity[:, rows],
+            spin=self.spin[:, rows],
+        )
 
 
 @dataclass(frozen=True, repr=False)
 class Group:
-    """The W walkers of one kind, of n beads each, in F frames of a motion of all beads; SI units.
+    """The W walkers of one kind, of n beads each, in F frames of a motion; SI units.
 
-    ``rows`` are the indices of their beads in the motion, shape (W, n); positions, velocities and spins have the shape
-    (F, W, n, 3).
+    Attributes
+    ----------
+    motion
+        The motion of all beads.
+    case
+        Its case.
+    kind
+        The table of these walkers in the case.
+    walkers
+        The walkers with the indices of their beads in the motion.
+    rows : ndarray of int, shape (W, n)
+        Indices of their beads in the motion.
+    time : ndarray, shape (F,)
+        Time since the start of the drive, s.
+    position, velocity, spin : ndarray, shape (F, W, n, 3)
+        Position (m), velocity (m/s) and angular velocity (rad/s) of their beads.
     """
 
     motion: Motion
@@ -204,20 +272,24 @@ class Group:
 
     @property
     def drive_axis(self) -> FloatArray:
-        """Reference direction of orientations in the plane of the floor: that of the drive, or x."""
+        """Unit vector in the plane of the substrate from which orientations are measured.
+
+        It is the direction of the drive, or x if the drive is perpendicular to the substrate.
+        """
         return np.array(self.case.drive_axis)
 
     @property
     def across_axis(self) -> FloatArray:
-        """Direction in the plane of the floor, a quarter turn to the left of `drive_axis`."""
+        """Unit vector in the plane of the substrate, a quarter turn to the left of `drive_axis`."""
         return np.cross([0.0, 0.0, 1.0], self.drive_axis)
 
     @cached_property
     def heading(self) -> FloatArray:
-        """Headings: unit vectors in the plane of the floor, shape (F, W, 3).
+        """Headings: unit vectors in the plane of the substrate, shape (F, W, 3).
 
-        They point from the centroid of the small beads to that of the large beads; with beads of one size, from the
-        hindmost to the foremost beads (`walkers.inputs.tables.bodies.Walkers.toward_large`).
+        They point from the centroid of the small beads to that of the large beads; with beads of
+        one size, from the hindmost to the foremost beads
+        (`walkers.inputs.tables.bodies.Walkers.toward_large`).
         """
         arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.kind.toward_large))
         arm[..., 2] = 0.0
@@ -226,62 +298,124 @@ class Group:
 
     @cached_property
     def gap(self) -> FloatArray:
-        """Gaps of beads to their nearest walls, then of pairs, m, negative for overlap, shape (F, W, n + pairs)."""
-        position, boundary = self.position, self.case.boundary
-        heights = (
-            [position[..., 2]]
-            if boundary.bare
-            else [wall.distances(position) for wall in boundary.walls]
-        )
-        gaps = [reduce(np.minimum, heights) - self.radii]
+        """Gaps, m, negative for overlap, shape (F, W, n + pairs).
+
+        The gaps of the beads to their nearest walls come first, then those of the pairs of beads.
+        """
+        gaps = [self._wall_distance() - self.radii]
         for first, second in self.kind.pairs:
-            distance = np.linalg.norm(position[:, :, first] - position[:, :, second], axis=-1)
-            gaps.append((distance - (self.radii[first] + self.radii[second]))[..., None])
+            arm = self.position[:, :, first] - self.position[:, :, second]
+            distance = np.linalg.norm(arm, axis=-1)
+            gap = distance - (self.radii[first] + self.radii[second])
+            gaps.append(gap[..., None])
         return np.concatenate(gaps, axis=-1)
+
+    def _wall_distance(self) -> FloatArray:
+        """Distance of the centre of each bead from its nearest wall, m, shape (F, W, n)."""
+        boundary = self.case.boundary
+        if boundary.bare:
+            height: FloatArray = self.position[..., 2]
+            return height
+        first_wall, *other_walls = boundary.walls
+        distance = first_wall.distances(self.position)
+        for wall in other_walls:
+            distance = np.minimum(distance, wall.distances(self.position))
+        return distance
 
     @cached_property
     def orientation(self) -> FloatArray:
-        """ψ, rad, shape (F, W): by how much walkers are turned from the direction that they face, unwrapped.
+        """Angle ψ by which walkers are turned from the direction that they face, rad, shape (F, W).
 
-        An arrangement that faces this direction has ψ = 0, also if its beads in front are beside its middle.
+        It is unwrapped: a walker that goes round has more than π. An arrangement that faces its
+        direction has ψ = 0, even if its foremost beads are beside its middle.
         """
-        ahead, aside = np.array(self.kind.front) @ np.array(self.kind.design)
-        arm = np.einsum("fwbx,b->fwx", self.position, np.array(self.kind.front))
+        front = np.array(self.kind.front)
+        front_ahead, front_aside = front @ np.array(self.kind.design)
+        arm = np.einsum("fwbx,b->fwx", self.position, front)
         facing = np.array([walker.facing for walker in self.walkers])
-        turned = np.arctan2(facing * (arm @ self.across_axis), facing * (arm @ self.drive_axis))
-        angle: FloatArray = np.unwrap(turned - np.arctan2(aside, ahead), axis=0)
+        ahead = facing * (arm @ self.drive_axis)
+        aside = facing * (arm @ self.across_axis)
+        turned = np.arctan2(aside, ahead)
+        turned_in_design = np.arctan2(front_aside, front_ahead)
+        angle: FloatArray = np.unwrap(turned - turned_in_design, axis=0)
         return angle
 
     @cached_property
     def turned_at(self) -> FloatArray:
-        """End of the first cycle with a heading more than 90° from that at the start, s; NaN if none; shape (W,)."""
-        strobe = self.case.run.samples_per_cycle
-        over = np.abs(self.orientation[::strobe] - self.orientation[0]) > np.pi / 2.0
-        return np.where(over.any(axis=0), self.time[::strobe][over.argmax(axis=0)], np.nan)
+        """Time at which walkers have turned by more than 90° from their start, s, shape (W,).
+
+        It is the end of the first cycle with such a heading; NaN if there is none.
+        """
+        frames_per_cycle = self.case.run.samples_per_cycle
+        turned = self.orientation[::frames_per_cycle] - self.orientation[0]
+        has_turned = np.abs(turned) > np.pi / 2.0
+        first_turned = has_turned.argmax(axis=0)
+        time = self.time[::frames_per_cycle]
+        return np.where(has_turned.any(axis=0), time[first_turned], np.nan)
 
 
 def interpolated_positions(moved: Motion | Group, share: float) -> FloatArray:
-    """Positions at a fraction of each of the F - 1 intervals between frames, by cubic Hermite interpolation."""
-    interval = np.diff(moved.time).reshape(-1, *[1] * (moved.position.ndim - 1))
-    begin, end, left = moved.position[:-1], moved.position[1:], 1.0 - share
-    position = left**2 * (1.0 + 2.0 * share) * begin + share**2 * (3.0 - 2.0 * share) * end
-    position += share * left * interval * (left * moved.velocity[:-1] - share * moved.velocity[1:])
+    """Interpolate positions between frames by cubic Hermite polynomials.
+
+    Parameters
+    ----------
+    moved
+        A motion, or a group of walkers, of F frames.
+    share
+        Fraction of each interval between frames, from 0 to 1, at which positions are evaluated.
+
+    Returns
+    -------
+    ndarray, shape (F - 1, …, 3)
+        Positions, m.
+    """
+    begin = moved.position[:-1]
+    end = moved.position[1:]
+    rest = 1.0 - share
+    interval = np.diff(moved.time)
+    interval = interval.reshape(-1, *[1] * (moved.position.ndim - 1))
+    position = rest**2 * (1.0 + 2.0 * share) * begin + share**2 * (3.0 - 2.0 * share) * end
+    slopes = rest * moved.velocity[:-1] - share * moved.velocity[1:]
+    position += share * rest * interval * slopes
     return position
 
 
 def came_near(centre: FloatArray, near: float) -> bool:
-    """Whether two of W points, shape (F, W, 2), ever came within a distance of each other."""
-    return any(
-        np.linalg.norm(centre[:, number:] - centre[:, number - 1, None], axis=-1).min() < near
-        for number in range(1, centre.shape[1])
-    )
+    """Tell whether two points ever came within a distance of each other.
+
+    Parameters
+    ----------
+    centre : ndarray, shape (F, W, 2)
+        Places of W points in F frames, m.
+    near
+        The distance, m.
+    """
+    for number in range(1, centre.shape[1]):
+        arm = centre[:, number:] - centre[:, number - 1, None]
+        if np.linalg.norm(arm, axis=-1).min() < near:
+            return True
+    return False
 
 
 def read_motion(directory: str | Path) -> Motion:
     """Read the beads of a run directory with its segments, finished or not.
 
-    `DumpError` if there is no segment, or a segment cannot be read; `FileNotFoundError` if the
-    directory is not a run directory.
+    Parameters
+    ----------
+    directory
+        The run directory.
+
+    Returns
+    -------
+    Motion
+        The motion of all beads in all frames of the segments that are complete.
+
+    Raises
+    ------
+    DumpError
+        If there is no segment, or a segment cannot be read.
+    FileNotFoundError
+        If the directory is not a run directory.
 
     Examples
     --------
@@ -292,127 +426,167 @@ def read_motion(directory: str | Path) -> Motion:
     (241, 6, 3)
     """
     directory = Path(directory)
-    case, paths = case_of(directory), segment_directories(directory)
+    case = case_of(directory)
+    paths = segment_directories(directory)
     if not paths:
         raise DumpError(f"{directory}: no segment of the run is finished yet")
     try:
-        return _joined(case, paths)
+        return _joined(case, _read_segments(case, paths))
     except NoNumberError as error:
-        finished = (directory / MANIFEST_NAME).is_file()  # then its dumps contained no such numbers
-        message = (
-            "the dump was damaged after the run was finished"
-            if finished
-            else "the simulation blew up"
-        )
-        raise DumpError(f"{error}: {message}") from error
-
-
-def _opened(path: Path) -> tuple[dict[str, Any], DeckLayout, BinaryDump]:
-    """Record, layout and bead dump of a segment."""
-    place = path / SEGMENT_NAME
-    try:
-        record = read_json(place)
-        record = {name: record[name] for name in ("begin", "end", "drive_from")}
-        place = path
-        layout = read_layout(path)
-        if not (path / layout.bead_dump).exists():
-            why = "was left out, as the dumps of calibrations, spreads and some archives; to make the run again"
-            raise DumpError(
-                f"{path / layout.bead_dump} {why}: walkers run {run_of_segment(path)} --force"
-            )
-        return record, layout, BinaryDump(path / layout.bead_dump, layout.bead_columns)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise DumpError(f"{place}: cannot be read ({error})") from error
+        # A run gets its manifest when it is finished; then its dumps contained no such numbers.
+        if (directory / MANIFEST_NAME).is_file():
+            reason = "the dump was damaged after the run was finished"
+        else:
+            reason = "the simulation blew up"
+        raise DumpError(f"{error}: {reason}") from error
 
 
 @dataclass(frozen=True)
-class _Part:
-    """A segment of a run: its record, layout and dump, and the number of the first frame that is new in it."""
+class _Segment:
+    """A segment of a run.
+
+    Attributes
+    ----------
+    path
+        Its directory.
+    begin, end
+        Steps of the engine at its start and its end.
+    drive_from
+        Step at which the drive starts; None if it has not started in this segment.
+    layout
+        Columns and sizes of its dumps.
+    dump
+        Its bead dump.
+    first_new_frame
+        Number of the first frame that the segment before does not have.
+    """
 
     path: Path
-    record: dict[str, Any]
+    begin: int
+    end: int
+    drive_from: int | None
     layout: DeckLayout
     dump: BinaryDump
-    first: int
+    first_new_frame: int
 
     @property
-    def frames(self) -> range:
+    def new_frames(self) -> range:
         """Numbers of the frames that the segment before does not have."""
-        return range(self.first, len(self.dump))
+        return range(self.first_new_frame, len(self.dump))
 
 
-def _parts_of(case: Case, paths: Sequence[Path]) -> list[_Part]:
-    """The segments of a run; `DumpError` if they do not continue each other, or a dump has the wrong size."""
-    parts: list[_Part] = []
-    steps: list[int] = []
+def _open_segment(path: Path, first_new_frame: int) -> _Segment:
+    """Open the record, layout and bead dump of a segment; `DumpError` if one cannot be read."""
+    source = path / SEGMENT_NAME
+    try:
+        record = read_json(source)
+        begin = record["begin"]
+        end = record["end"]
+        drive_from = record["drive_from"]
+        source = path
+        layout = read_layout(path)
+        bead_dump = path / layout.bead_dump
+        if not bead_dump.exists():
+            raise DumpError(
+                f"{bead_dump} was left out, as the dumps of calibrations, spreads and some "
+                f"archives; to make the run again: walkers run {run_of_segment(path)} --force"
+            )
+        dump = BinaryDump(bead_dump, layout.bead_columns)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise DumpError(f"{source}: cannot be read ({error})") from error
+    return _Segment(path, begin, end, drive_from, layout, dump, first_new_frame)
+
+
+def _read_segments(case: Case, paths: Sequence[Path]) -> list[_Segment]:
+    """Open the segments of a run.
+
+    `DumpError` if a segment does not continue the one before, or a dump has the wrong size.
+    """
+    segments: list[_Segment] = []
     for path in paths:
-        record, layout, dump = _opened(path)
-        if record["begin"] != (steps[-1] if steps else 0):
+        # The first frame of a segment repeats the last one of the segment before.
+        first_new_frame = 1 if segments else 0
+        segment = _open_segment(path, first_new_frame)
+        dump = segment.dump
+        end_of_previous = segments[-1].dump.steps[-1] if segments else 0
+        if segment.begin != end_of_previous:
             raise DumpError(f"{path}: the segment before it is missing")
-        is_whole = len(dump) and not dump.truncated and dump.steps[-1] == record["end"]
-        if not is_whole and (len(paths) > 1 or case.run.rests):
+        is_whole = len(dump) > 0 and not dump.truncated and dump.steps[-1] == segment.end
+        may_be_cut_short = len(paths) == 1 and not case.run.rests
+        if not is_whole and not may_be_cut_short:
             raise DumpError(f"{path}: its dump is incomplete")
         if len(dump) < 2:
             raise DumpError(f"{dump.path}: {len(dump)} complete frames, too few for a motion")
-        if dump.rows != layout.atoms:
-            raise DumpError(f"{path}: {dump.rows} rows, expected {layout.atoms}")
-        first = 1 if steps else 0  # the first frame repeats the last one of the previous segment
-        parts.append(_Part(path, record, layout, dump, first))
-        steps += dump.steps[first:].tolist()
-    return parts
+        if dump.rows != segment.layout.atoms:
+            raise DumpError(f"{path}: {dump.rows} rows, expected {segment.layout.atoms}")
+        segments.append(segment)
+    return segments
 
 
-def _vectors(parts: Sequence[_Part]) -> dict[str, FloatArray]:
+def _read_vectors(segments: Sequence[_Segment]) -> dict[str, FloatArray]:
     """Vectors of the beads in all frames, by the names of their first columns; shape (F, N, 3).
 
-    Each array is filled once: a stack of whole frames, and copies of parts of it, would need twice the memory.
+    Each array is filled once: a stack of whole frames, and copies of parts of it, would need twice
+    the memory.
     """
+    layout = segments[-1].layout
     names = ["x", "vx", "omegax"]
-    if MEAN_SPIN_COLUMNS[0] in parts[-1].layout.bead_columns:
+    if MEAN_SPIN_COLUMNS[0] in layout.bead_columns:
         names.append(MEAN_SPIN_COLUMNS[0])
-    frames = sum(len(part.frames) for part in parts)
-    vectors = {name: np.empty((frames, parts[-1].layout.atoms, 3)) for name in names}
-    place = 0
-    for part in parts:
-        columns = {name: part.layout.bead_columns.index(name) for name in names}
-        for number in part.frames:
-            values = part.dump.frame(number)
-            for name, column in columns.items():
-                vectors[name][place] = values[:, column : column + 3]
-            place += 1
+    frames = sum(len(segment.new_frames) for segment in segments)
+    vectors = {name: np.empty((frames, layout.atoms, 3)) for name in names}
+    frame = 0
+    for segment in segments:
+        first_columns = {name: segment.layout.bead_columns.index(name) for name in names}
+        for number in segment.new_frames:
+            values = segment.dump.frame(number)
+            for name, column in first_columns.items():
+                vectors[name][frame] = values[:, column : column + 3]
+            frame += 1
     return vectors
 
 
-def _joined(case: Case, paths: Sequence[Path]) -> Motion:
+def _joined(case: Case, segments: Sequence[_Segment]) -> Motion:
     """The motion over all segments of a run."""
-    parts, run = _parts_of(case, paths), case.run
-    last = parts[-1]
-    steps = np.concatenate([part.dump.steps[part.first :] for part in parts])
-    starts = [part.record["drive_from"] for part in parts]
-    start = next((step for step in starts if step is not None), None)
-    # Without a drive yet, it begins in the frame after the last one.
-    begin = steps[-1] + run.steps_per_sample if start is None else start
-    time = (steps - begin) * run.time_step
-    vectors = _vectors(parts)
-    shift, speed = prescribed_motion(case.excitation, time)
-    if start:  # in the last frame at rest the walls do not move yet
-        speed[time == 0.0] = 0.0
-    vectors["x"] -= shift[:, None]
-    vectors["vx"] -= speed[:, None]
-    cycles = last.record["end"] // run.steps_per_cycle if run.until_steady else run.cycles
+    run = case.run
+    first = segments[0]
+    last = segments[-1]
+    steps = np.concatenate([segment.dump.steps[segment.first_new_frame :] for segment in segments])
+    drive_steps = [segment.drive_from for segment in segments if segment.drive_from is not None]
+    # A drive that has not started yet starts in the frame after the last one.
+    drive_step = drive_steps[0] if drive_steps else steps[-1] + run.steps_per_sample
+    time = (steps - drive_step) * run.time_step
+
+    vectors = _read_vectors(segments)
+    displacement, velocity = prescribed_motion(case.excitation, time)
+    if drive_steps and drive_step > 0:
+        velocity[time == 0.0] = 0.0  # in the last frame at rest the walls do not move yet
+    vectors["x"] -= displacement[:, None]
+    vectors["vx"] -= velocity[:, None]
+
+    cycles = run.cycles
+    completed_case = case
+    if run.until_steady:
+        cycles = last.end // run.steps_per_cycle
+        completed_case = case.for_cycles(cycles)
+    walkers = []
+    for walker in last.layout.walkers:
+        beads_from_zero = tuple(bead - 1 for bead in walker.beads)
+        walkers.append(replace(walker, beads=beads_from_zero))
+    frames = []
+    for segment in segments:
+        frames += [(segment.path, number) for number in segment.new_frames]
+    radius_column = first.layout.bead_columns.index("radius")
     return Motion(
-        case=case.for_cycles(cycles) if run.until_steady else case,
+        case=completed_case,
         time=time,
         position=vectors["x"],
         velocity=vectors["vx"],
         spin=vectors["omegax"],
         substrate=visible_displacement(case.excitation, time),
-        radius=parts[0].dump.frame(0)[:, parts[0].layout.bead_columns.index("radius")].copy(),
-        walkers=tuple(
-            replace(walker, beads=tuple(bead - 1 for bead in walker.beads))
-            for walker in last.layout.walkers
-        ),
-        frames=[(part.path, number) for part in parts for number in part.frames],
+        radius=first.dump.frame(0)[:, radius_column].copy(),
+        walkers=tuple(walkers),
+        frames=frames,
         truncated=last.dump.truncated,
         ended_early=cycles < run.cycles,
         mean_spin=vectors.get(MEAN_SPIN_COLUMNS[0]),
@@ -420,35 +594,85 @@ def _joined(case: Case, paths: Sequence[Path]) -> Motion:
 
 
 def prescribed_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Displacement and velocity of the walls in the frame of the drive, m and m/s, shape (F, 3)."""
+    """Compute the motion of the walls in the frame of reference of the drive.
+
+    Parameters
+    ----------
+    drive
+        The drive.
+    time : ndarray, shape (F,)
+        Time since the start of the drive, s.
+
+    Returns
+    -------
+    displacement, velocity : ndarray, shape (F, 3)
+        In m and m/s; zero if the frame of reference is that of the walls.
+    """
     displacement, velocity = boundary_motion(drive, time)
-    return (
-        (displacement, velocity) if drive.frame == "lab" else (0.0 * displacement, 0.0 * velocity)
-    )
+    if drive.frame == "lab":
+        return displacement, velocity
+    return 0.0 * displacement, 0.0 * velocity
 
 
 def boundary_motion(drive: Excitation, time: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Displacement and velocity of the boundary in the laboratory, m and m/s, shape (F, 3); zero before 0 s."""
-    displacement, velocity = np.zeros((len(time), 3)), np.zeros((len(time), 3))
+    """Compute the motion of the boundary in the laboratory.
+
+    Parameters
+    ----------
+    drive
+        The drive.
+    time : ndarray, shape (F,)
+        Time since the start of the drive, s.
+
+    Returns
+    -------
+    displacement, velocity : ndarray, shape (F, 3)
+        In m and m/s; zero before the drive.
+    """
+    displacement = np.zeros((len(time), 3))
+    velocity = np.zeros((len(time), 3))
     driven = time >= 0.0
-    for direction, (place, speed, _) in drive.motions(time):
-        displacement += np.outer(place * driven, direction)
+    for direction, (course, speed, _) in drive.motions(time):
+        displacement += np.outer(course * driven, direction)
         velocity += np.outer(speed * driven, direction)
     return displacement, velocity
 
 
 def visible_displacement(drive: Excitation, time: FloatArray) -> FloatArray:
-    """Displacement of the boundary in pictures, m, shape (F, 3): without the slow part of a record, zero before 0 s."""
+    """Compute the displacement of the boundary in pictures.
+
+    Parameters
+    ----------
+    drive
+        The drive.
+    time : ndarray, shape (F,)
+        Time since the start of the drive, s.
+
+    Returns
+    -------
+    ndarray, shape (F, 3)
+        Displacement, m, without the slow part of a record; zero before the drive.
+    """
     return drive.shaking(time) * (time >= 0.0)[:, None]
 
 
 @dataclass(frozen=True)
 class Bridges:
-    """The bridges of one frame of a motion (index ``frame``): K between beads, then M to walls.
+    """The bridges of one frame of a motion: K between beads, then M to walls.
 
-    ``contacts``, shape (K + M, 3), are both beads, from 0, in ascending order, and -1; of a bridge to a wall the bead,
-    -1 and the wall (0: floor). ``force`` is the net normal force (capillary, viscous and elastic, N, positive for
-    attraction), ``gap`` (m) is negative for overlap. The engine reports wrong tangential forces of sliding contacts.
+    The engine reports wrong tangential forces of sliding contacts, so there are none here.
+
+    Attributes
+    ----------
+    frame
+        Index of the frame in the motion.
+    contacts : ndarray of int, shape (K + M, 3)
+        Of a bridge between beads: both beads in ascending order, from 0, and −1. Of a bridge to a
+        wall: the bead, −1 and the index of the wall (0 for the floor).
+    force : ndarray, shape (K + M,)
+        Net normal force (capillary, viscous and elastic), N, positive for attraction.
+    gap : ndarray, shape (K + M,)
+        Gap, m, negative for overlap.
     """
 
     frame: int
@@ -470,15 +694,37 @@ class Bridges:
         return self.contacts[self.contacts[:, 2] >= 0][:, [0, 2]].T
 
     def rows(self) -> dict[str, npt.NDArray[Any]]:
-        """Columns of a table."""
-        ends = dict(zip(("bead_1", "bead_2", "wall"), self.contacts.T, strict=True))
-        return {**ends, "gap": self.gap, "normal_force": self.force, "touching": self.gap <= 0.0}
+        """Columns of the table ``bridges``."""
+        bead_1, bead_2, wall = self.contacts.T
+        return {
+            "bead_1": bead_1,
+            "bead_2": bead_2,
+            "wall": wall,
+            "gap": self.gap,
+            "normal_force": self.force,
+            "touching": self.gap <= 0.0,
+        }
 
 
 def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Iterator[Bridges]:
-    """The bridges between the beads of a motion in each frame that recorded them, or in some of these frames.
+    """Read the bridges between the beads of a motion, one frame after the other.
 
-    Raises a `DumpError` if a dump cannot be read or ends early, or if no frame recorded bridges.
+    Parameters
+    ----------
+    motion
+        The motion; it may have some of the frames and beads of the run.
+    frames
+        Indices of the frames to read; None reads all.
+
+    Yields
+    ------
+    Bridges
+        The bridges of each of these frames that recorded them.
+
+    Raises
+    ------
+    DumpError
+        If a dump cannot be read or ends early, or if none of all frames recorded bridges.
     """
     stride = motion.case.run.samples_per_bridge_sample
     frame_at = {
@@ -486,52 +732,101 @@ def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Itera
         for frame, place in enumerate(motion.frames)
         if frames is None or frame in frames
     }
-    for segment in dict.fromkeys(segment for segment, _ in motion.frames):
+    segments = dict.fromkeys(segment for segment, _ in motion.frames)
+    for segment in segments:
         layout = read_layout(segment)
         pairs = local_frames(segment / layout.pair_bridge_dump, layout.pair_bridge_columns)
         walls = local_frames(segment / layout.wall_bridge_dump, layout.wall_bridge_columns)
-        number = -1
-        for number, ((_, between), (_, against)) in enumerate(zip(pairs, walls, strict=False)):
+        count = 0
+        for number, (pair_frame, wall_frame) in enumerate(zip(pairs, walls, strict=False)):
+            count = number + 1
             frame = frame_at.pop((segment, stride * number), None)
             if frame is not None:
-                yield _bridges(motion, frame, between, against, layout)
-        if number + 1 != layout.bridge_frames:
-            raise DumpError(
-                f"{segment}: its bridges hold {number + 1} of {layout.bridge_frames} frames"
-            )
+                _, pair_rows = pair_frame
+                _, wall_rows = wall_frame
+                yield _bridges(motion, frame, pair_rows, wall_rows, layout)
+        if count != layout.bridge_frames:
+            raise DumpError(f"{segment}: its bridges hold {count} of {layout.bridge_frames} frames")
     if frames is None and len(frame_at) == len(motion.frames):
         raise DumpError(f"{motion.directory}: none of its frames recorded bridges")
 
 
 def _bridges(
-    motion: Motion, frame: int, between: FloatArray, against: FloatArray, layout: DeckLayout
+    motion: Motion, frame: int, pair_rows: FloatArray, wall_rows: FloatArray, layout: DeckLayout
 ) -> Bridges:
-    place, pair, wall = (
-        motion.position[frame],
-        layout.pair_bridge_columns.index,
-        layout.wall_bridge_columns.index,
+    """The bridges of a frame from the rows of both dumps of bridges."""
+    number_in_motion = _numbers_in_motion(motion, layout.atoms)
+    pairs, pair_force, pair_gap = _pair_bridges(
+        motion.position[frame], pair_rows, layout.pair_bridge_columns, number_in_motion
     )
-    index = np.full(layout.atoms, -1)  # in the motion, which may hold some of the beads
-    index[slice(None) if motion.bead_numbers is None else motion.bead_numbers] = np.arange(
-        len(place)
+    beads_and_walls, wall_force, wall_gap = _wall_bridges(
+        motion, frame, wall_rows, layout.wall_bridge_columns, number_in_motion
     )
-    # The dumps also contain neighbours without a bridge; their force is zero.
-    between = between[np.any(between[:, pair("fx") : pair("fx") + 3] != 0.0, axis=1)]
-    against = against[np.any(against[:, wall("fx") : wall("fx") + 3] != 0.0, axis=1)]
-    ids = index[between[:, [pair("id1"), pair("id2")]].astype(np.int64) - 1]
-    beads = index[against[:, wall("id")].astype(np.int64) - 1]
-    held, kept = np.all(ids >= 0, axis=1), beads >= 0
-    between, against, ids, beads = between[held], against[kept], ids[held], beads[kept]
-    arm = place[ids[:, 1]] - place[ids[:, 0]]
-    pull = np.einsum("kx,kx->k", between[:, pair("fx") : pair("fx") + 3], arm) / np.linalg.norm(
-        arm, axis=1
+    contacts = np.full((len(pairs) + len(beads_and_walls), 3), -1)
+    contacts[: len(pairs), :2] = np.sort(pairs, axis=1)
+    contacts[len(pairs) :, [0, 2]] = beads_and_walls
+    return Bridges(
+        frame=frame,
+        contacts=contacts,
+        force=np.concatenate([pair_force, wall_force]),
+        gap=np.concatenate([pair_gap, wall_gap]),
     )
-    walls = against[:, wall("wall")].astype(np.int64)
-    normals = np.stack([surface.normals(place[beads]) for surface in motion.case.boundary.walls])
-    normals = normals[walls, np.arange(len(walls))]
-    wall_pull = -np.einsum("mx,mx->m", against[:, wall("fx") : wall("fx") + 3], normals)
-    contacts = np.full((len(ids) + len(walls), 3), -1)
-    contacts[: len(ids), :2] = np.sort(ids, axis=1)
-    contacts[len(ids) :, [0, 2]] = np.stack([beads, walls], axis=1)
-    gap = -np.concatenate([between[:, pair("overlap")], against[:, wall("overlap")]])
-    return Bridges(frame, contacts, np.concatenate([pull, wall_pull]), gap)
+
+
+def _numbers_in_motion(motion: Motion, atoms: int) -> IntArray:
+    """Index in a motion of each bead of the run, −1 for beads that the motion does not have."""
+    if motion.bead_numbers is None:
+        return np.arange(atoms)
+    number_in_motion = np.full(atoms, -1)
+    number_in_motion[motion.bead_numbers] = np.arange(len(motion.bead_numbers))
+    return number_in_motion
+
+
+def _with_force(rows: FloatArray, first_column: int) -> FloatArray:
+    """Rows of a dump that have a bridge; the dumps also have neighbours without one and force."""
+    force = rows[:, first_column : first_column + 3]
+    return rows[np.any(force != 0.0, axis=1)]
+
+
+def _pair_bridges(
+    position: FloatArray, rows: FloatArray, columns: Sequence[str], number_in_motion: IntArray
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Both beads, shape (K, 2), normal force (N) and gap (m), shape (K,), of bridges between beads.
+
+    ``position`` is that of the beads in the frame, m, shape (N, 3).
+    """
+    fx = columns.index("fx")
+    rows = _with_force(rows, fx)
+    ids = rows[:, [columns.index("id1"), columns.index("id2")]].astype(np.int64)
+    beads = number_in_motion[ids - 1]
+    in_motion = np.all(beads >= 0, axis=1)
+    rows = rows[in_motion]
+    beads = beads[in_motion]
+    arm = position[beads[:, 1]] - position[beads[:, 0]]
+    force_on_first = rows[:, fx : fx + 3]
+    normal_force = np.einsum("kx,kx->k", force_on_first, arm) / np.linalg.norm(arm, axis=1)
+    return beads, normal_force, -rows[:, columns.index("overlap")]
+
+
+def _wall_bridges(
+    motion: Motion,
+    frame: int,
+    rows: FloatArray,
+    columns: Sequence[str],
+    number_in_motion: IntArray,
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Bead and wall, shape (M, 2), normal force (N) and gap (m), shape (M,), of wall bridges."""
+    fx = columns.index("fx")
+    rows = _with_force(rows, fx)
+    beads = number_in_motion[rows[:, columns.index("id")].astype(np.int64) - 1]
+    in_motion = beads >= 0
+    rows = rows[in_motion]
+    beads = beads[in_motion]
+    walls = rows[:, columns.index("wall")].astype(np.int64)
+    position = motion.position[frame, beads]
+    surfaces = motion.case.boundary.walls
+    normals_of_walls = np.stack([surface.normals(position) for surface in surfaces])
+    normals = normals_of_walls[walls, np.arange(len(walls))]
+    normal_force = -np.einsum("mx,mx->m", rows[:, fx : fx + 3], normals)
+    beads_and_walls = np.stack([beads, walls], axis=1)
+    return beads_and_walls, normal_force, -rows[:, columns.index("overlap")]
