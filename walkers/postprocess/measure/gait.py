@@ -41,7 +41,7 @@ _LITTLE, _FADING, _NO_FASTER = 0.005, 0.9, 1e-4
 """A velocity is constant only if the walker stops turning. Its largest rotation per cycle in the second half of the run
 must be below the first angle (rad) and exceed that in the first half by less than the third angle; or it must be at
 most the second number times that in the first half."""
-GROWS = 0.05
+LEAST_GROWTH_RATE = 0.05
 """Rate above which small angles to the axis count as growing, 1/s: by half in ten seconds."""
 _NOTHING, _LITTLE_ASIDE = 1e-4, np.radians(0.8)
 """Increase of the mean angle, rad, that counts as none; on a level floor, a mean angle, rad, from which it goes on:
@@ -233,7 +233,7 @@ class _Growth(NamedTuple):
     rate: FloatArray  # from the second to the last third of the measured cycles, 1/s
     mean: FloatArray  # of the last third, rad
     end: FloatArray  # at the end of the run, rad
-    grows: BoolArray  # at more than `GROWS`, and faster than before
+    grows: BoolArray  # at more than `LEAST_GROWTH_RATE`, and faster than before
 
 
 def _growth_of_angles(group: Group) -> _Growth:
@@ -247,7 +247,7 @@ def _growth_of_angles(group: Group) -> _Growth:
     third = len(angle) / 3.0 * run.cycles_per_sample / group.case.excitation.frequency
     with np.errstate(divide="ignore", invalid="ignore"):
         rate = np.log(last / second) / third
-    grows = (rate > GROWS) & (last - second > np.maximum(second - first, _NOTHING))
+    grows = (rate > LEAST_GROWTH_RATE) & (last - second > np.maximum(second - first, _NOTHING))
     return _Growth(rate, last, angle[-1], grows)
 
 
