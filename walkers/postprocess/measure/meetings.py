@@ -60,7 +60,7 @@ def measure(motion: Motion) -> Measurement:
             rows += [
                 (frames[number], event, *pair, size[number, pair[0]]) for pair in sorted(pairs)
             ]
-    table = columns_of(rows, frame=int, event=str, walker=int, other=int, size=int)
+    table = columns_of(rows, {"frame": int, "event": str, "walker": int, "other": int, "size": int})
     frame, walker, partner = table.pop("frame"), table["walker"], table["other"]
     cosine = (heading[frame, walker] * heading[frame, partner]).sum(axis=-1)
     table |= {"time": motion.time[frame], "angle": np.arccos(np.clip(cosine, -1.0, 1.0))}

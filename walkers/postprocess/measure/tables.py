@@ -5,7 +5,7 @@ They are written with pyarrow alone, because pandas takes a third of a second to
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -27,13 +27,20 @@ def numbered_columns(name: str, values: npt.NDArray[Any]) -> Columns:
     return {f"{name}_{number + 1}": values[..., number] for number in range(values.shape[-1])}
 
 
-def columns_of(rows: Iterable[Sequence[Any]], **kinds: type) -> Columns:
-    """Columns of these names and types from rows, of which there may be none."""
-    cells = list(zip(*rows, strict=True)) or [()] * len(kinds)
-    return {
-        name: np.array(cell, dtype=kind)
-        for (name, kind), cell in zip(kinds.items(), cells, strict=True)
-    }
+def columns_of(rows: Sequence[Sequence[Any]], types: Mapping[str, type]) -> Columns:
+    """Make columns of rows.
+
+    Parameters
+    ----------
+    rows
+        The rows, of which there may be none; each has a cell for each column.
+    types
+        Names and types of the columns.
+    """
+    columns: Columns = {}
+    for place, (name, column_type) in enumerate(types.items()):
+        columns[name] = np.array([row[place] for row in rows], dtype=column_type)
+    return columns
 
 
 def write_table(directory: Path, name: str, columns: Columns) -> None:
