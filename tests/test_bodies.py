@@ -22,7 +22,7 @@ from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.gait import postures
-from walkers.postprocess.measure.meetings import collective
+from walkers.postprocess.measure.meetings import TrayCourse, collective
 from walkers.postprocess.measure.motion import Group, read_motion
 from walkers.postprocess.measure.results import read_results
 from walkers.postprocess.measure.tables import read_table
@@ -477,9 +477,8 @@ def test_what_walkers_do_as_many_is_counted() -> None:
     speed[50:, :2], speed[10:30, 2:] = 0.0, 0.5e-3
     way = np.concatenate([np.zeros((1, 4)), np.cumsum(0.1 * speed, axis=0)])
     headings = np.broadcast_to(heading, (101, 4, 2))
-    found = collective(
-        time, way[..., None] * heading, headings, size, held, 2, np.array([1.0, 0.0])
-    )
+    course = TrayCourse(time, way[..., None] * heading, headings, size, held)
+    found = collective(course, 2, np.array([1.0, 0.0]))
     joined = (
         40 * 0.5 / 140
     )  # of 140 intervals between frames in which one was joined, 40 at half the speed

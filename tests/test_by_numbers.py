@@ -22,6 +22,7 @@ from walkers.inputs.resolving.loads import bridge_at_rest, contact_loads
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import Harmonic, waveform
 from walkers.postprocess.measure import meetings
+from walkers.postprocess.measure.clusters import HeldCluster
 from walkers.postprocess.measure.gait import averages, fit_slopes, settled_samples
 from walkers.postprocess.measure.motion import Bridges, Motion
 from walkers.postprocess.measure.numbers import short_text
@@ -682,9 +683,9 @@ def test_the_order_of_walkers_is_about_the_axis_of_the_drive(turn: float) -> Non
     heading = np.broadcast_to([axis, -axis, across], (11, 3, 2))
     alone, free = np.ones((11, 3), dtype=np.int64), np.zeros((11, 3), dtype=bool)
     time = np.linspace(2.0, 3.0, 11)
-    found = meetings.collective(
-        time, 1e-3 * time[:, None, None] * heading, heading, alone, free, 6, axis
-    )
+    centre = 1e-3 * time[:, None, None] * heading
+    course = meetings.TrayCourse(time, centre, heading, alone, free)
+    found = meetings.collective(course, 6, axis)
     assert found["meeting_rate"] == pytest.approx(2 * 6 / 3.0)
     assert found["nematic_order"] == pytest.approx(1.0 / 3.0)
     assert found["polar_order"] == pytest.approx(1.0 / 3.0)
@@ -703,7 +704,8 @@ def test_the_end_of_a_tray_is_the_last_tenth_of_its_drive() -> None:
     late = np.stack([1.0 - turned[:, 0], turned[:, 0]], axis=1)
     heading = np.stack([late, late, late], axis=1)
     alone, free = np.ones((101, 3), dtype=np.int64), np.zeros((101, 3), dtype=bool)
-    found = meetings.collective(time, centre, heading, alone, free, 0, np.array([1.0, 0.0]))
+    course = meetings.TrayCourse(time, centre, heading, alone, free)
+    found = meetings.collective(course, 0, np.array([1.0, 0.0]))
     assert found["slow_share"] == pytest.approx(1.0 / 3.0)
     assert found["nematic_order"] == pytest.approx(-1.0)
 
@@ -713,7 +715,8 @@ def test_the_end_of_a_drive_of_two_frames_is_the_time_between_them() -> None:
     centre = np.zeros((2, 2, 2))
     centre[1, 0] = [1e-4, 0.0]  # one walks at 1 mm/s, one rests: their mean is 0.5 mm/s
     alone, free = np.ones((2, 2), dtype=np.int64), np.zeros((2, 2), dtype=bool)
-    found = meetings.collective(time, centre, heading, alone, free, 0, np.array([1.0, 0.0]))
+    course = meetings.TrayCourse(time, centre, heading, alone, free)
+    found = meetings.collective(course, 0, np.array([1.0, 0.0]))
     assert (found["free_speed"], found["slow_share"]) == (pytest.approx(5e-4), 0.5)
 
 
@@ -731,7 +734,8 @@ def test_the_state_of_a_bed() -> None:
     )
     bulk = np.array([True, True, False, False])
     moved = replace(motion, position=position, velocity=velocity)
-    state = _state_of(moved, bridges, bulk, [(frozenset({2, 3}), frozenset({SIDE}))], FLOOR)
+    cluster = HeldCluster(frozenset({2, 3}), frozenset({SIDE}))
+    state = _state_of(moved, bridges, bulk, [cluster], FLOOR)
     bed = SimpleNamespace(**state)
     assert (bed.touching, bed.opened, bed.contacts, bed.bridges) == (1, 1, 0.5, 1.0)
     assert (bed.at_wall, bed.large_at_wall, bed.bulk, bed.clusters) == (1, 0, 2, 1)

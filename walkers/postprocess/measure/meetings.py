@@ -1,16 +1,19 @@
 """Walkers that may meet: meetings and their outcome, clustering and jamming.
 
-Walkers that bridges connect, directly or through others, are *joined*: they are a cluster. A cluster, or a single
-walker, is *held* if a bridge joins one of its beads to a side wall. A walker is *free* if it is neither joined nor
-held. A *meeting* of two walkers begins with the first bridge between them and ends when the last one breaks. *At the
-end* means during the last tenth of the drive.
+Walkers that bridges connect, directly or through others, are *joined*: they are a cluster. A
+cluster, or a single walker, is *held* if a bridge joins one of its beads to a side wall. A walker
+is *free* if it is neither joined nor held. A *meeting* of two walkers begins with the first bridge
+between them and ends when the last one breaks. *At the end* means during the last tenth of the
+drive.
+
+Clusters of loose beads are the subject of `walkers.postprocess.measure.clusters`.
 """
 
 from __future__ import annotations
 
-from itertools import pairwise
+from dataclasses import dataclass
 from math import isfinite, nan, pi
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,107 +35,229 @@ _END = 0.1
 
 
 def applies(case: Case) -> bool:
-    """Whether walkers of a case may meet."""
+    """Tell whether walkers of a case may meet."""
     return case.meets
 
 
 def derived(case: Case) -> dict[str, float]:
-    """Coverage, rounded to three digits so that equal trays form one group in figures."""
-    boundary, spacing = case.boundary, max(kind.spacing for kind in case.walkers)
-    cell = spacing * (boundary.width or spacing)
-    floor = (
-        boundary.geometry.cross_section
-        if boundary.closed
-        else cell * sum(kind.replicates for kind in case.walkers)
-    )
-    return {"coverage": float(f"{pi * sum(radius**2 for radius in case.all_radii) / floor:.3g}")}
+    """Compute the coverage of the substrate by the beads.
+
+    It is rounded to three digits, so that equal trays form one group in figures.
+    """
+    boundary = case.boundary
+    if boundary.closed:
+        area = boundary.geometry.cross_section
+    else:
+        spacing = max(kind.spacing for kind in case.walkers)
+        cell = spacing * (boundary.width or spacing)
+        area = cell * sum(kind.replicates for kind in case.walkers)
+    beads = pi * sum(radius**2 for radius in case.all_radii)
+    return {"coverage": float(f"{beads / area:.3g}")}
 
 
 def measure(motion: Motion) -> Measurement:
-    """Table and numbers; walkers that are joined in the first frame merge at that time."""
-    (centre, heading), run = centres_and_headings(motion), motion.case.run
+    """Measure meetings, and what many walkers do together.
+
+    Parameters
+    ----------
+    motion
+        Motion of a run whose walkers may meet.
+
+    Returns
+    -------
+    Measurement
+        The table ``meetings`` and the numbers of the group ``meetings``. Walkers that are joined in
+        the first frame merge at that time.
+    """
+    centre, heading = centres_and_headings(motion)
     frames = np.array([bridges.frame for bridges in motion.bridges])
-    joined, *states = zip(*(_state_of(motion, bridges) for bridges in motion.bridges), strict=True)
-    size, held = map(np.array, states)
+    states = [_state_of(motion, bridges) for bridges in motion.bridges]
+    size = np.array([state.size for state in states])
+    held = np.array([state.held for state in states])
+
     rows: list[tuple[int, str, int, int, int]] = []
-    for number, (before, now) in enumerate(pairwise((frozenset(), *joined))):
-        for event, pairs in (("merged", now - before), ("parted", before - now)):
+    before: frozenset[tuple[int, int]] = frozenset()
+    for number, state in enumerate(states):
+        frame = frames[number]
+        for event, pairs in (("merged", state.joined - before), ("parted", before - state.joined)):
             rows += [
-                (frames[number], event, *pair, size[number, pair[0]]) for pair in sorted(pairs)
+                (frame, event, walker, other, size[number, walker])
+                for walker, other in sorted(pairs)
             ]
-    table = columns_of(rows, {"frame": int, "event": str, "walker": int, "other": int, "size": int})
-    frame, walker, partner = table.pop("frame"), table["walker"], table["other"]
-    cosine = (heading[frame, walker] * heading[frame, partner]).sum(axis=-1)
-    table |= {"time": motion.time[frame], "angle": np.arccos(np.clip(cosine, -1.0, 1.0))}
+        before = state.joined
+    types = {"frame": int, "event": str, "walker": int, "other": int, "size": int}
+    table = columns_of(rows, types)
+    frame_of_event = table.pop("frame")
+    first_heading = heading[frame_of_event, table["walker"]]
+    second_heading = heading[frame_of_event, table["other"]]
+    cosine = (first_heading * second_heading).sum(axis=-1)
+    table["time"] = motion.time[frame_of_event]
+    table["angle"] = np.arccos(np.clip(cosine, -1.0, 1.0))
+
     merged = int(np.sum(table["event"] == "merged"))
-    numbers = {"merged": merged, "parted": len(frame) - merged, "largest_group": int(size.max())}
-    often = max(1, run.samples_per_cycle // run.samples_per_bridge_sample)
-    chosen = np.arange(len(frames))[::-often][::-1]  # all at the same phase
+    numbers = {
+        "merged": merged,
+        "parted": len(frame_of_event) - merged,
+        "largest_group": int(size.max()),
+    }
+    run = motion.case.run
+    bridge_samples_per_cycle = max(1, run.samples_per_cycle // run.samples_per_bridge_sample)
+    chosen = np.arange(len(frames))[::-bridge_samples_per_cycle][::-1]  # all at the same phase
     chosen = chosen[motion.time[frames[chosen]] >= 0.0]
-    if len(at := frames[chosen]) > 1:
-        course = (motion.time[at], centre[at], heading[at], size[chosen], held[chosen])
-        numbers |= collective(*course, merged, np.array(motion.case.drive_axis)[:2])
+    if len(chosen) > 1:
+        chosen_frames = frames[chosen]
+        course = TrayCourse(
+            time=motion.time[chosen_frames],
+            centre=centre[chosen_frames],
+            heading=heading[chosen_frames],
+            size=size[chosen],
+            held=held[chosen],
+        )
+        numbers |= collective(course, merged, np.array(motion.case.drive_axis)[:2])
     return Measurement({"meetings": table}, numbers)
 
 
-def _state_of(
-    motion: Motion, bridges: Bridges
-) -> tuple[frozenset[tuple[int, ...]], IntArray, BoolArray]:
-    """Pairs of walkers that bridges join in a frame; size of the cluster of each walker, and whether it is held."""
+class _State(NamedTuple):
+    """How W walkers are joined in a frame.
+
+    Attributes
+    ----------
+    joined
+        Pairs of walkers between which there is a bridge, the smaller index first.
+    size : ndarray of int, shape (W,)
+        Number of walkers in the cluster of each walker.
+    held : ndarray of bool, shape (W,)
+        Whether this cluster is held by a side wall.
+    """
+
+    joined: frozenset[tuple[int, int]]
+    size: IntArray
+    held: BoolArray
+
+
+def _state_of(motion: Motion, bridges: Bridges) -> _State:
+    """How walkers are joined in the frame of the bridges."""
     owners = np.sort(motion.walker_of[bridges.beads], axis=1)
-    between = owners[(owners[:, 0] >= 0) & (owners[:, 0] != owners[:, 1])]
-    labels = connected(len(motion.walkers), np.unique(between, axis=0))
+    between_walkers = (owners[:, 0] >= 0) & (owners[:, 0] != owners[:, 1])
+    pairs = owners[between_walkers]
+    labels = connected(len(motion.walkers), np.unique(pairs, axis=0))
     floored = motion.case.boundary.walls[0].name == FLOOR
     beads, walls = bridges.at_walls
     at_sides = motion.walker_of[beads[(walls > 0) & floored]]
     held = np.isin(labels, labels[at_sides[at_sides >= 0]])
-    return frozenset(map(tuple, between.tolist())), np.bincount(labels)[labels], held
+    joined = frozenset((first, second) for first, second in pairs.tolist())
+    return _State(joined=joined, size=np.bincount(labels)[labels], held=held)
 
 
 def centres_and_headings(motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Centres of mass (m) and headings of all walkers in the plane of the floor, shape (F, W, 2)."""
-    centre, heading = (np.zeros((len(motion.time), len(motion.walkers), 2)) for _ in range(2))
-    for group in map(motion.group, range(len(motion.case.walkers))):
-        numbers = [walker.walker for walker in group.walkers]
-        centre[:, numbers], heading[:, numbers] = group.mass_centre[..., :2], group.heading[..., :2]
+    """Centres of mass and headings of all walkers in the plane of the substrate.
+
+    Parameters
+    ----------
+    motion
+        The motion of F frames of W walkers.
+
+    Returns
+    -------
+    centre : ndarray, shape (F, W, 2)
+        Centres of mass, m.
+    heading : ndarray, shape (F, W, 2)
+        Headings.
+    """
+    centre = np.zeros((len(motion.time), len(motion.walkers), 2))
+    heading = np.zeros((len(motion.time), len(motion.walkers), 2))
+    for number in range(len(motion.case.walkers)):
+        group = motion.group(number)
+        walkers = [walker.walker for walker in group.walkers]
+        centre[:, walkers] = group.mass_centre[..., :2]
+        heading[:, walkers] = group.heading[..., :2]
     return centre, heading
 
 
-def collective(
-    time: FloatArray,
-    centre: FloatArray,
-    heading: FloatArray,
-    size: IntArray,
-    held: BoolArray,
-    merged: int,
-    axis: FloatArray,
-) -> dict[str, Any]:
-    """Collective numbers of a result of W walkers in K frames, two or more, at least one per cycle; NaN if undefined.
+@dataclass(frozen=True)
+class TrayCourse:
+    """What W walkers do in K frames of the drive, two or more, at least one per cycle.
 
-    ``centre`` (of mass, m) and ``heading`` have the shape (K, W, 2), ``size`` (number of walkers in the cluster) and
-    ``held`` (K, W); ``merged`` is the number of meetings, ``axis`` the unit vector of the drive.
+    Attributes
+    ----------
+    time : ndarray, shape (K,)
+        Time of the frames, s.
+    centre : ndarray, shape (K, W, 2)
+        Centres of mass in the plane of the substrate, m.
+    heading : ndarray, shape (K, W, 2)
+        Headings in the plane of the substrate.
+    size : ndarray of int, shape (K, W)
+        Number of walkers in the cluster of each walker.
+    held : ndarray of bool, shape (K, W)
+        Whether this cluster is held by a side wall.
     """
-    begin = min(int(np.searchsorted(time, time[-1] - _END * (time[-1] - time[0]))), len(time) - 2)
+
+    time: FloatArray
+    centre: FloatArray
+    heading: FloatArray
+    size: IntArray
+    held: BoolArray
+
+    @property
+    def duration(self) -> float:
+        """Time from the first frame to the last one, s."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def first_frame_of_end(self) -> int:
+        """First frame of the last tenth of the drive; the last but one at the latest."""
+        start = self.time[-1] - _END * (self.time[-1] - self.time[0])
+        return min(int(np.searchsorted(self.time, start)), len(self.time) - 2)
+
+
+def collective(course: TrayCourse, meetings: int, axis: FloatArray) -> dict[str, Any]:
+    """Compute the numbers that describe what many walkers do together.
+
+    Parameters
+    ----------
+    course
+        The walkers during the drive.
+    meetings
+        Number of meetings.
+    axis : ndarray, shape (2,)
+        Unit vector of the drive in the plane of the substrate.
+
+    Returns
+    -------
+    dict of str to number
+        Numbers of the group ``meetings`` in SI units; NaN where one is not defined, such as the
+        speed of joined walkers if none are joined.
+    """
+    time = course.time
+    centre = course.centre
     speed = np.linalg.norm(np.diff(centre, axis=0), axis=-1) / np.diff(time)[:, None]
-    alone, late = size == 1, heading[begin:]
+    single = course.size == 1
+    free_speed = _mean_speed(speed, single & ~course.held)
+    joined_speed = _mean_speed(speed, ~single & ~course.held)
 
-    def mean_speed(chosen: BoolArray) -> float:
-        """Mean speed over the intervals at both ends of which a condition holds."""
-        speeds = speed[chosen[:-1] & chosen[1:]]
-        return float(speeds.mean()) if speeds.size else nan
-
-    free, joined = mean_speed(alone & ~held), mean_speed(~alone & ~held)
-    late_velocity = (centre[-1] - centre[begin]) / (time[-1] - time[begin])
-    slow = np.linalg.norm(late_velocity, axis=-1) < _SLOW * free
+    begin = course.first_frame_of_end
+    final_heading = course.heading[begin:]
+    final_velocity = (centre[-1] - centre[begin]) / (time[-1] - time[begin])
+    slow = np.linalg.norm(final_velocity, axis=-1) < _SLOW * free_speed
+    walkers = course.size.shape[1]
     return {
-        "meeting_rate": 2.0 * merged / (size.shape[1] * float(time[-1] - time[0])),
-        "clustered_share": float((~alone[-1]).mean()),
-        "largest_cluster": int(size[-1].max()),
-        "held_share": float(held[-1].mean()),
-        "nematic_order": float((2.0 * (late @ axis) ** 2 - 1.0).mean()),
-        "polar_order": float(np.linalg.norm(late.mean(axis=1), axis=-1).mean()),
-        "free_speed": free,
-        "joined_speed": joined,
-        "speed_ratio": joined / free if free else nan,
-        "slow_share": float(slow.mean()) if isfinite(free) else nan,
+        "meeting_rate": 2.0 * meetings / (walkers * course.duration),
+        "clustered_share": float((~single[-1]).mean()),
+        "largest_cluster": int(course.size[-1].max()),
+        "held_share": float(course.held[-1].mean()),
+        "nematic_order": float((2.0 * (final_heading @ axis) ** 2 - 1.0).mean()),
+        "polar_order": float(np.linalg.norm(final_heading.mean(axis=1), axis=-1).mean()),
+        "free_speed": free_speed,
+        "joined_speed": joined_speed,
+        "speed_ratio": joined_speed / free_speed if free_speed else nan,
+        "slow_share": float(slow.mean()) if isfinite(free_speed) else nan,
     }
+
+
+def _mean_speed(speed: FloatArray, chosen: BoolArray) -> float:
+    """Mean speed (m/s) over intervals at both ends of which walkers are chosen; NaN without any.
+
+    The speed has the shape (K - 1, W), the choice of walkers (K, W).
+    """
+    speeds = speed[chosen[:-1] & chosen[1:]]
+    return float(speeds.mean()) if speeds.size else nan

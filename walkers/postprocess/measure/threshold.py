@@ -1,12 +1,13 @@
-"""The threshold of motion in one run: the drive falls slowly until walkers stop, or rises until they start.
+"""The threshold of motion: the drive at which walkers stop or start, from one run.
 
-The drive changes by a ramp, or because the amplitude of a record changes. Its strength is the local
-amplitude of its acceleration (`walkers.inputs.tables.drive.Excitation.local_amplitude`).
+The drive falls slowly until walkers stop, or rises until they start, by a ramp or because the
+amplitude of a record changes. Its strength is the local amplitude of its acceleration
+(`walkers.inputs.tables.drive.Excitation.local_amplitude`).
 
 A window is a few cycles. A walker moves in it if it is faster than
-`walkers.postprocess.measure.sides.REST`. It stops at the end of the last window in which it moves while the
-drive falls, and starts at the begin of the first one in which it moves while the drive rises, if it
-rests in others. The resolution is the change of the drive in this window.
+`walkers.postprocess.measure.sides.REST`. It stops at the end of the last window in which it moves
+while the drive falls, and starts at the start of the first window in which it moves while the drive
+rises, if it rests in others. The resolution is the change of the drive in this window.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from walkers.postprocess.measure.gait import distance_walked
 from walkers.postprocess.measure.motion import Motion
 from walkers.postprocess.measure.numbers import Measurement
 from walkers.postprocess.measure.sides import REST
+from walkers.postprocess.measure.tables import Columns
 
 NAME = "threshold"
 VERSION = 2
@@ -30,7 +32,7 @@ VERSION = 2
 WINDOW_CYCLES = 8
 """Cycles of a window."""
 _COARSE = 0.3
-"""Share of a threshold above which its resolution is told as a doubt."""
+"""Resolution over threshold above which the resolution is told as a doubt."""
 _EXACT = 1e-9
 """Largest change of a constant drive with a ramp, over its strength: rounding errors."""
 _REVERSAL = 0.05
@@ -38,7 +40,7 @@ _REVERSAL = 0.05
 
 
 def applies(case: Case) -> bool:
-    """Whether a case has walkers, and a drive whose strength changes."""
+    """Tell whether a case has walkers, and a drive whose strength changes."""
     return bool(case.walkers and case.excitation.changes) and case.run.cycles_per_sample == 1
 
 
@@ -48,44 +50,80 @@ def derived(case: Case) -> dict[str, float]:  # noqa: ARG001
 
 
 def measure(motion: Motion) -> Measurement:
-    """The table ``ramp`` and the numbers: means over the walkers that stop or start.
+    """Measure the drives at which walkers stop and start.
 
-    If the amplitude of a record changes, but no walker stops or starts, there are no numbers: the
-    mean velocity stands, with a warning.
+    Parameters
+    ----------
+    motion
+        Motion of walkers under a drive whose strength changes.
+
+    Returns
+    -------
+    Measurement
+        The table ``ramp``, and the numbers of the group ``threshold``: means over the walkers that
+        stop or start. If the amplitude of a record changes, but no walker stops or starts, there
+        are no numbers: the mean velocity stands, with a warning.
     """
-    case, drive = motion.case, motion.case.excitation
+    drive = motion.case.excitation
     walked = [distance_walked(group) for group in motion.groups]
-    times = walked[0][0][::WINDOW_CYCLES]
-    whole = np.concatenate([distance[::WINDOW_CYCLES] for _, distance in walked], axis=1)
-    velocity = np.diff(whole, axis=0) / np.diff(times)[:, None]
+    time_of_cycles, _ = walked[0]
+    times = time_of_cycles[::WINDOW_CYCLES]
+    distances = [distance[::WINDOW_CYCLES] for _, distance in walked]
+    velocity = np.diff(np.concatenate(distances, axis=1), axis=0) / np.diff(times)[:, None]
     peaks = drive.local_amplitude(times)
-    middle = (peaks[1:] + peaks[:-1]) / 2.0
-    owner = [walker.walker for group in motion.groups for walker in group.walkers]
-    columns = {
-        "walker": np.repeat(owner, len(middle)),
-        "time": np.tile((times[1:] + times[:-1]) / 2.0, len(owner)),
-        "peak_acceleration": np.tile(middle, len(owner)),
+    tables = {"ramp": _ramp_table(motion, times, peaks, velocity)}
+
+    thresholds = _thresholds(np.abs(velocity) > REST, peaks, by_ramp=bool(drive.ramp))
+    has_threshold = any(isfinite(threshold) for threshold in thresholds.values())
+    if not drive.ramp and not has_threshold:
+        lowest = peaks.min() / ACCELERATION_OF_ONE_G
+        highest = peaks.max() / ACCELERATION_OF_ONE_G
+        warning = (
+            "the amplitude of the strongest line of the record lies between "
+            f"{lowest:.3g} and {highest:.3g} g: the velocity is a mean over different drives"
+        )
+        return Measurement(tables, {}, (warning,))
+
+    numbers = dict(thresholds)
+    if len(motion.case.walkers[0].radii) == 2:
+        gamma0 = dimer_of(motion.case).gamma0
+        for name, threshold in thresholds.items():
+            numbers[f"gamma0_{name}"] = gamma0(threshold)
+    return Measurement(tables, numbers, _doubts(thresholds))
+
+
+def _ramp_table(
+    motion: Motion, times: FloatArray, peaks: FloatArray, velocity: FloatArray
+) -> Columns:
+    """Table ``ramp``: velocity of each walker in each of K windows.
+
+    ``times`` (s) and ``peaks`` (m/s²) are at the ends of the windows, shape (K + 1,); ``velocity``
+    (m/s) has the shape (K, W).
+    """
+    middle_times = (times[1:] + times[:-1]) / 2.0
+    middle_peaks = (peaks[1:] + peaks[:-1]) / 2.0
+    numbers: list[int] = []
+    for group in motion.groups:
+        numbers += [walker.walker for walker in group.walkers]
+    return {
+        "walker": np.repeat(numbers, len(middle_times)),
+        "time": np.tile(middle_times, len(numbers)),
+        "peak_acceleration": np.tile(middle_peaks, len(numbers)),
         "velocity": velocity.T.reshape(-1),
     }
-    numbers = _thresholds(np.abs(velocity) > REST, peaks, by_ramp=bool(drive.ramp))
-    if not drive.ramp and not any(map(isfinite, numbers.values())):
-        low, high = (amplitude / ACCELERATION_OF_ONE_G for amplitude in (peaks.min(), peaks.max()))
-        changing = f"the amplitude of the strongest line of the record lies between {low:.3g} and {high:.3g} g"
-        return Measurement(
-            {"ramp": columns}, {}, (f"{changing}: the velocity is a mean over different drives",)
-        )
+
+
+def _doubts(thresholds: dict[str, float]) -> tuple[str, ...]:
+    """Warnings about thresholds (m/s²) whose resolution is coarse."""
     doubts = []
     for verb in ("stops", "starts"):
-        within = numbers[f"{verb}_within"]
-        if within > _COARSE * numbers[f"{verb}_at"]:
-            change = f"{within / ACCELERATION_OF_ONE_G:.2g} g in {WINDOW_CYCLES} cycles"
+        resolution = thresholds[f"{verb}_within"]
+        if resolution > _COARSE * thresholds[f"{verb}_at"]:
+            change = f"{resolution / ACCELERATION_OF_ONE_G:.2g} g in {WINDOW_CYCLES} cycles"
             doubts.append(
                 f"the drive at which a walker {verb} is uncertain: it changes by {change}"
             )
-    if len(case.walkers[0].radii) == 2:
-        gamma0 = dimer_of(case).gamma0
-        numbers |= {f"gamma0_{name}": gamma0(number) for name, number in numbers.items()}
-    return Measurement({"ramp": columns}, numbers, tuple(doubts))
+    return tuple(doubts)
 
 
 def _thresholds(moves: BoolArray, peaks: FloatArray, *, by_ramp: bool) -> dict[str, float]:
@@ -104,6 +142,7 @@ def _thresholds(moves: BoolArray, peaks: FloatArray, *, by_ramp: bool) -> dict[s
     noise = (_EXACT if by_ramp else _REVERSAL) * float(peaks.max())
     direction = drive_changes(peaks, noise)
     falls = np.flatnonzero(direction < 0)
+    # Rises are taken backward in time: then a walker that starts comes to rest, as one that stops.
     rises = np.flatnonzero(direction > 0)[::-1]
     stops, stops_within = _crossed(moves[falls], peaks[falls + 1], np.abs(change[falls]))
     starts, starts_within = _crossed(moves[rises], peaks[rises], np.abs(change[rises]))
@@ -116,22 +155,29 @@ def _thresholds(moves: BoolArray, peaks: FloatArray, *, by_ramp: bool) -> dict[s
 
 
 def drive_changes(peaks: FloatArray, noise: float) -> IntArray:
-    """Whether the drive rises (1), falls (-1) or neither (0) in each window, shape (K,) for K windows.
+    """Tell in which windows the drive rises and falls.
 
     It rises from a minimum to the next maximum, and falls from a maximum to the next minimum.
-    Reversals by ``noise`` or less count as going on: a small rise in a fall is part of the fall.
-    Windows in which the drive stays exactly as it is are a plateau: it does neither.
+    Smaller reversals than the noise count as going on: a small rise in a fall is part of the fall.
+    Windows in which the drive stays exactly as it is are a plateau, where it does neither.
 
     Parameters
     ----------
     peaks : ndarray, shape (K + 1,)
-        Amplitude of the drive at the ends of the windows, m/s².
+        Amplitude of the drive at the ends of K windows, m/s².
     noise
         Largest change that is no reversal, m/s².
+
+    Returns
+    -------
+    ndarray of int, shape (K,)
+        1 where the drive rises, -1 where it falls, 0 where it does neither.
     """
     direction = np.zeros(len(peaks) - 1, dtype=np.int64)
-    highest = lowest = last_turn = 0
-    current = 0
+    current = 0  # direction since the last turn; 0 before it is known
+    last_turn = 0
+    highest = 0  # places of the extremes since the last turn
+    lowest = 0
     for number, peak in enumerate(peaks.tolist()):
         if peak > peaks[highest]:
             highest = number
@@ -139,26 +185,42 @@ def drive_changes(peaks: FloatArray, noise: float) -> IntArray:
             lowest = number
         if current >= 0 and peak < peaks[highest] - noise:  # the maximum is behind
             direction[last_turn:highest] = current
-            last_turn, lowest, current = highest, number, -1
-        elif current <= 0 and peak > peaks[lowest] + noise:
+            last_turn = highest
+            lowest = number
+            current = -1
+        elif current <= 0 and peak > peaks[lowest] + noise:  # the minimum is behind
             direction[last_turn:lowest] = current
-            last_turn, highest, current = lowest, number, 1
-    direction[last_turn : highest if current > 0 else lowest] = current
+            last_turn = lowest
+            highest = number
+            current = 1
+    last_extreme = highest if current > 0 else lowest
+    direction[last_turn:last_extreme] = current
     direction[np.diff(peaks) == 0.0] = 0
     return direction
 
 
 def _crossed(moves: BoolArray, peaks: FloatArray, change: FloatArray) -> tuple[float, float]:
-    """Mean drive of walkers at the end of the last window in which they move, if they rest after; and its change."""
-    ends = (
-        len(moves) - 1 - np.argmax(moves[::-1], axis=0)
-        if len(moves)
-        else np.zeros(0, dtype=np.int64)
-    )
-    ends = ends[
-        [
-            bool(column.any()) and end < len(moves) - 1
-            for column, end in zip(moves.T, ends, strict=False)
-        ]
-    ]
-    return (float(peaks[ends].mean()), float(change[ends].mean())) if len(ends) else (nan, nan)
+    """Mean drive in the last window in which walkers move, of those that rest afterwards.
+
+    Parameters
+    ----------
+    moves : ndarray of bool, shape (K, W)
+        Whether walkers move in each window.
+    peaks : ndarray, shape (K,)
+        Amplitude of the drive at the end of each window, m/s².
+    change : ndarray, shape (K,)
+        Change of the drive in each window, m/s².
+
+    Returns
+    -------
+    float, float
+        Mean amplitude and mean change over these walkers, m/s²; NaN if there are none.
+    """
+    if len(moves) == 0:
+        return nan, nan
+    last_moving = len(moves) - 1 - np.argmax(moves[::-1], axis=0)
+    rests_afterwards = moves.any(axis=0) & (last_moving < len(moves) - 1)
+    windows = last_moving[rests_afterwards]
+    if len(windows) == 0:
+        return nan, nan
+    return float(peaks[windows].mean()), float(change[windows].mean())
