@@ -1,8 +1,12 @@
-"""Numbers of results as rows of text: of the printed result, reports and notebooks."""
+"""Numbers of results as rows of text: of the printed result, reports and notebooks.
+
+It decides which numbers of a result are shown, how they are called, and with how many digits.
+Names, units and meanings are declared in `walkers.postprocess.measure.quantities`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from math import isfinite, nan
@@ -17,17 +21,24 @@ from walkers.postprocess.measure.quantities import (
     ordered,
     unit_shown,
 )
-from walkers.postprocess.measure.sides import REST
+from walkers.postprocess.measure.sides import REST, direction_names
 from walkers.postprocess.measure.tables import Columns
 from walkers.rounding import counted, rounded, with_decimals
 
 
 @dataclass(frozen=True)
 class Measurement:
-    """What a module measures: tables, numbers in SI units, reasons to doubt them.
+    """What a module measures.
 
-    Names of numbers are those of `walkers.postprocess.measure.quantities.GROUPS`. A number that is
-    not defined is None or NaN.
+    Attributes
+    ----------
+    tables
+        Columns of its tables by the names of the tables.
+    numbers
+        Numbers in SI units, by the names of `walkers.postprocess.measure.quantities.GROUPS`. A
+        number that is not defined is None or NaN.
+    warnings
+        Reasons to doubt the numbers.
     """
 
     tables: Mapping[str, Columns]
@@ -37,7 +48,21 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Row:
-    """A number of a result as text: label, value, its displayed unit, and its errors in this unit."""
+    """A number of a result as text.
+
+    Attributes
+    ----------
+    name
+        Its name in the result.
+    label
+        What it is called.
+    text
+        Its value in the displayed unit.
+    unit
+        The displayed unit.
+    error
+        Its errors in this unit, with words; empty if it has none.
+    """
 
     name: str
     label: str
@@ -53,166 +78,280 @@ NOT_SHOWN_ALONE = SHOWN["aside"]
 
 
 def headline(numbers: Mapping[str, Any]) -> str:
-    """Name of the main number of a result: climbs of piles, or a velocity that walkers have.
+    """Name the main number of a result.
 
-    On a slope the velocity up the slope if some walkers do not stay upright; the velocity of those that face right (up)
-    if it differs from that of the others. Empty without walkers and piles.
+    Parameters
+    ----------
+    numbers
+        The numbers of a result.
+
+    Returns
+    -------
+    str
+        ``climbs`` for piles. For walkers ``velocity``; ``right_facing`` if the velocity of those
+        that face right (up) differs from that of the others; ``axial_velocity``, that up the slope,
+        if some do not stay upright. Empty without walkers and piles.
     """
-    if "velocity" not in numbers:
-        return "climbs" if "climbs" in numbers else ""
-    if not_all_upright(numbers):
-        return "axial_velocity"
-    return "right_facing" if numbers.get("facings_differ") else "velocity"
+    if "velocity" in numbers:
+        if not_all_upright(numbers):
+            return "axial_velocity"
+        return "right_facing" if numbers.get("facings_differ") else "velocity"
+    return "climbs" if "climbs" in numbers else ""
 
 
 def not_all_upright(numbers: Mapping[str, Any]) -> bool:
-    """Whether walkers turned over or lean on a slope: then a velocity along the heading says little about their way."""
+    """Tell whether walkers turned over or lean on a slope.
+
+    Then a velocity along the heading says little about where they go.
+    """
     return "upright" in numbers and bool(numbers["upright"] < numbers["walkers"])
 
 
 def state(numbers: Mapping[str, Any]) -> str:
-    """State of walkers whose mean velocity is not informative: ``at rest``, of a ramp ``stops at 0.8 g``, or empty."""
+    """Describe the state of walkers whose mean velocity is not informative.
+
+    Parameters
+    ----------
+    numbers
+        The numbers of a result.
+
+    Returns
+    -------
+    str
+        Such as ``at rest``, or ``stops at 0.8 g`` under a ramp; empty if the velocity says more.
+    """
     if numbers.get("came_apart"):
         return "came apart"
-    thresholds = {verb: numbers.get(f"{verb}_at", nan) for verb in ("stops", "starts")}
-    if texts := [
-        f"{verb} at {' '.join(number_text(peak, 'm/s^2'))}"
-        for verb, peak in thresholds.items()
-        if isfinite(peak)
-    ]:
-        return ", ".join(texts)
+    thresholds = []
+    for verb in ("stops", "starts"):
+        peak_acceleration = numbers.get(f"{verb}_at", nan)
+        if isfinite(peak_acceleration):
+            text, unit = number_text(peak_acceleration, "m/s^2")
+            thresholds.append(f"{verb} at {text} {unit}")
+    if thresholds:
+        return ", ".join(thresholds)
     if "stops_at" in numbers:
         return "no threshold within the ramp"
     if isfinite(numbers.get("slow_share", nan)):
-        count = numbers["walkers"]
-        slow, clustered = (
-            round(count * numbers[name]) for name in ("slow_share", "clustered_share")
-        )
-        return f"{slow} of {count} walkers slow, {clustered} in clusters"
-    return "at rest" if "velocity" in numbers and abs(numbers[headline(numbers)]) < REST else ""
+        walkers = numbers["walkers"]
+        slow = round(walkers * numbers["slow_share"])
+        clustered = round(walkers * numbers["clustered_share"])
+        return f"{slow} of {walkers} walkers slow, {clustered} in clusters"
+    if "velocity" in numbers and abs(numbers[headline(numbers)]) < REST:
+        return "at rest"
+    return ""
 
 
 def short_text(numbers: Mapping[str, Any]) -> str:
-    """The state or the main number (`headline`): ``3 climbs``, ``1.080 mm/s``; a dash without walkers and piles."""
+    """Say the state or the main number of a result in a few words.
+
+    Parameters
+    ----------
+    numbers
+        The numbers of a result.
+
+    Returns
+    -------
+    str
+        Such as ``3 climbs`` or ``1.080 mm/s``; a dash without walkers and piles.
+    """
     main = headline(numbers)
-    if main in ("", "climbs"):
-        return counted(numbers[main], "climb") if main else "-"
-    if text := state(numbers):
-        return text
-    text = f"{number_text(numbers[main], 'm/s')[0]} mm/s"
+    if main == "":
+        return "-"
+    if main == "climbs":
+        return counted(numbers[main], "climb")
+    state_of_walkers = state(numbers)
+    if state_of_walkers:
+        return state_of_walkers
+    velocity, _ = number_text(numbers[main], "m/s")
     if main == "right_facing":
-        right, left = ("up", "down") if numbers["goes_uphill"] else ("right", "left")
-        return (
-            f"{text} facing {right}, {number_text(numbers['left_facing'], 'm/s')[0]} facing {left}"
-        )
-    return f"{text} up the slope" if main == "axial_velocity" else text
+        right, left = direction_names(uphill=numbers["goes_uphill"])
+        left_velocity, _ = number_text(numbers["left_facing"], "m/s")
+        return f"{velocity} mm/s facing {right}, {left_velocity} facing {left}"
+    if main == "axial_velocity":
+        return f"{velocity} mm/s up the slope"
+    return f"{velocity} mm/s"
 
 
 def rows(numbers: Mapping[str, Any]) -> list[Row]:
-    """The numbers of a result as text, in displayed units, in the order of their declarations.
+    """Write the numbers of a result as text.
 
-    Numbers that say nothing about any walker are left out: velocities and steadiness of walkers that came apart, means
-    over two directions that differ or under a ramp, orientations of walkers of which some turned round.
+    Parameters
+    ----------
+    numbers
+        The numbers of a result.
+
+    Returns
+    -------
+    list of Row
+        The numbers in displayed units, in the order of their declarations. Numbers that say nothing
+        about any walker are left out: velocities and steadiness of walkers that came apart, means
+        over two directions that differ or under a ramp, orientations of walkers of which some
+        turned round.
     """
-    main, hidden = headline(numbers), NOT_SHOWN_ALONE | SHOWN["hidden"]
+    listed = []
+    for name in ordered(numbers.keys() - _hidden_numbers(numbers)):
+        number = numbers[name]
+        if isinstance(number, (bool, str)) or not isfinite(number) or is_error(name):
+            continue
+        if number == 0 and _matches_any(name, SHOWN["if_any"]):
+            continue
+        quantity = declared(name)
+        label = _label(quantity, numbers)
+        text, unit = number_text(number, quantity.unit)
+        listed.append(Row(name, label, text, unit, _errors(numbers, quantity)))
+    return listed
+
+
+def _hidden_numbers(numbers: Mapping[str, Any]) -> set[str]:
+    """Names of the numbers of a result that have no row."""
+    main = headline(numbers)
+    hidden = set(NOT_SHOWN_ALONE | SHOWN["hidden"])
     if main == "axial_velocity" or (main == "right_facing" and numbers["goes_uphill"]):
         hidden -= {"axial_velocity", "axial_left_facing"}
     if not_all_upright(numbers):
         hidden |= {"right_facing", "left_facing"}
-    if not (
-        numbers.get("facing_right") and numbers.get("facing_left")
-    ):  # the velocity is that of the only direction
+    if not (numbers.get("facing_right") and numbers.get("facing_left")):
+        # The velocity is that of the only direction.
         hidden |= {"right_facing", "left_facing", "axial_left_facing"}
     if main != "velocity":
-        hidden |= {"velocity"}
+        hidden.add("velocity")
     if 0 < numbers.get("turned_round", 0) < numbers.get("walkers", 0):
-        hidden |= {"orientation_end"}
-    hidden |= meaningless_numbers(numbers)
-    listed = []
-    for name in ordered(numbers.keys() - hidden):
-        number = numbers[name]
-        if isinstance(number, (bool, str)) or not isfinite(number) or is_error(name):
-            continue
-        if number or not any(fnmatchcase(name, pattern) for pattern in SHOWN["if_any"]):
-            quantity = declared(name)
-            text, unit = number_text(number, quantity.unit)
-            listed.append(
-                Row(name, _label(quantity, numbers), text, unit, _errors(numbers, quantity))
-            )
-    return listed
+        hidden.add("orientation_end")
+    return hidden | meaningless_numbers(numbers)
+
+
+def _matches_any(name: str, patterns: Collection[str]) -> bool:
+    """Tell whether a name matches one of some patterns with ``*``."""
+    return any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
 def meaningless_numbers(numbers: Mapping[str, Any]) -> set[str]:
     """Names of the numbers that say nothing about walkers that came apart or under a ramp."""
-    patterns = SHOWN["not_of_a_ramp"] if "stops_at" in numbers else frozenset()
-    patterns |= SHOWN["not_of_parts"] if numbers.get("came_apart") else frozenset()
-    return {name for name in numbers if any(fnmatchcase(name, pattern) for pattern in patterns)}
+    patterns: set[str] = set()
+    if "stops_at" in numbers:
+        patterns |= SHOWN["not_of_a_ramp"]
+    if numbers.get("came_apart"):
+        patterns |= SHOWN["not_of_parts"]
+    return {name for name in numbers if _matches_any(name, patterns)}
 
 
 def _label(quantity: Quantity, numbers: Mapping[str, Any]) -> str:
-    """Label of a number: on a slope directions are up and down, and means over those that face up are called so."""
+    """Label of a number.
+
+    On a slope, right and left are called up and down, and means over the walkers that face up say
+    so.
+    """
     ground = "slope" if numbers.get("goes_uphill", False) else "level"
-    label = LABELS.get(quantity.name, {}).get(ground, quantity.label)
+    labels = LABELS.get(quantity.name, {})
+    label = labels.get(ground, quantity.label)
     if ground == "slope" and leaves_out_facing_down(quantity, numbers):
         return f"{label}, facing up"
     return label
 
 
 def leaves_out_facing_down(quantity: Quantity, numbers: Mapping[str, Any]) -> bool:
-    """Whether a number of a slope leaves out walkers that face down, of which there are some."""
-    is_mean_over_up = any(fnmatchcase(quantity.name, pattern) for pattern in SHOWN["facing_up"])
+    """Tell whether a number of a slope leaves out walkers that face down, of which there are some.
+
+    Parameters
+    ----------
+    quantity
+        The quantity of the number.
+    numbers
+        The numbers of the result.
+    """
+    is_mean_over_up = _matches_any(quantity.name, SHOWN["facing_up"])
     return bool(numbers["goes_uphill"] and numbers.get("facing_left") and is_mean_over_up)
 
 
 def number_text(number: float, unit: str) -> tuple[str, str]:
-    """A number (SI) as text in the displayed unit, and this unit; velocities have all decimals."""
-    usual, factor = unit_shown(unit)
+    """Write a number as text in the displayed unit.
+
+    Parameters
+    ----------
+    number
+        The number in SI units.
+    unit
+        Its SI unit.
+
+    Returns
+    -------
+    text, unit : str
+        The number and the displayed unit. Velocities have all decimals.
+    """
+    displayed_unit, factor = unit_shown(unit)
     value = number if factor == 1.0 else number * factor
-    return (with_decimals(value, 3) if usual == "mm/s" else rounded(value, usual)), usual
+    if displayed_unit == "mm/s":
+        return with_decimals(value, 3), displayed_unit
+    return rounded(value, displayed_unit), displayed_unit
 
 
 def _errors(numbers: Mapping[str, Any], quantity: Quantity) -> str:
-    """Scatter or resolution, band and numerical error of a number in its displayed unit; of an angle, its range."""
+    """Errors of a number in its displayed unit, with words.
+
+    They are the scatter or the resolution, the band and the numerical error; for the final angle,
+    also the range of the walkers.
+    """
     parts = []
     if quantity.name == "orientation_end" and numbers["walkers"] > 1:
-        ends = (
-            number_text(numbers[f"orientation_{end}"], quantity.unit)[0]
-            for end in ("smallest", "largest")
-        )
-        parts.append(f"walkers {' to '.join(ends)}")
-    if isfinite(scatter := numbers.get(quantity.error, nan)):
+        smallest, _ = number_text(numbers["orientation_smallest"], quantity.unit)
+        largest, _ = number_text(numbers["orientation_largest"], quantity.unit)
+        parts.append(f"walkers {smallest} to {largest}")
+    scatter = numbers.get(quantity.error, nan)
+    if isfinite(scatter):
         word = "resolution" if quantity.error.endswith("_within") else "scatter of copies"
         parts.append(f"{word} {error_text(scatter, quantity.unit)}")
-    parts += filter(None, [band_of(numbers, quantity)])
-    if isfinite(error := numbers.get(f"{quantity.name}_error", nan)):
+    band = band_of(numbers, quantity)
+    if band:
+        parts.append(band)
+    error = numbers.get(f"{quantity.name}_error", nan)
+    if isfinite(error):
         parts.append(f"numerical error {error_text(error, quantity.unit)}")
     return ", ".join(parts)
 
 
 def error_text(error: float, unit: str) -> str:
-    """An error (SI) with two digits in the displayed unit, without the unit; a dash for NaN."""
-    usual, factor = unit_shown(unit)
-    text = rounded(float(f"{error * factor:.2g}"), usual)
-    return "below 0.001" if text == "0" and usual == "mm/s" else text
+    """Write an error (in this SI unit) with two digits in the displayed unit, without the unit."""
+    displayed_unit, factor = unit_shown(unit)
+    text = rounded(float(f"{error * factor:.2g}"), displayed_unit)
+    return "below 0.001" if text == "0" and displayed_unit == "mm/s" else text
 
 
 def band_of(numbers: Mapping[str, Any], quantity: Quantity) -> str:
-    """The band of a number in the displayed unit, with the number of its draws; empty if it has none."""
-    low, high = (numbers.get(f"{quantity.name}_{end}") for end in ("low", "high"))
+    """Write the band of a number in the displayed unit, with the number of its draws.
+
+    Parameters
+    ----------
+    numbers
+        The numbers of a result.
+    quantity
+        The quantity of the number.
+
+    Returns
+    -------
+    str
+        Such as ``band 0.489 to 5.83 (40 draws)``; empty if the number has no band.
+    """
+    name = quantity.name
+    low = numbers.get(f"{name}_low")
+    high = numbers.get(f"{name}_high")
     if low is None or high is None:
         return ""
-    draws = draws_text(
-        numbers[f"{quantity.name}_draws"], approximate=numbers[f"{quantity.name}_approximate"]
-    )
+    draws = draws_text(numbers[f"{name}_draws"], approximate=numbers[f"{name}_approximate"])
     return f"band {band_text(low, high, quantity.unit)} ({draws})"
 
 
 def draws_text(draws: object, *, approximate: bool) -> str:
-    """How many draws a band is of, and whether it is approximate because they are few."""
+    """Say how many draws a band has, and whether it is approximate because they are few."""
     return f"{draws} draws, approximate" if approximate else f"{draws} draws"
 
 
 def band_text(low: float, high: float, unit: str) -> str:
-    """Both ends of a band in the displayed unit, with three digits, without the unit: ``0.489 to 5.83``."""
-    usual, factor = unit_shown(unit)
-    return " to ".join(rounded(float(f"{end * factor:.3g}"), usual) for end in (low, high))
+    """Write both ends of a band (in this SI unit) with three digits: ``0.489 to 5.83``.
+
+    The ends are in the displayed unit, which the text does not have.
+    """
+    displayed_unit, factor = unit_shown(unit)
+    low_text = rounded(float(f"{low * factor:.3g}"), displayed_unit)
+    high_text = rounded(float(f"{high * factor:.3g}"), displayed_unit)
+    return f"{low_text} to {high_text}"

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -17,7 +16,9 @@ from pathlib import Path
 from walkers.rounding import SHOWN_UNITS
 
 _FILE = tomllib.loads(Path(__file__).with_name("quantities.toml").read_text("utf-8"))
+"""The declarations."""
 _BAND = "of the draws over the ranges of uncertain values"
+"""Words of the meanings of the numbers of a band."""
 ENDS = {
     "low": ("5 %", f"5 % {_BAND}"),
     "high": ("95 %", f"95 % {_BAND}"),
@@ -28,17 +29,31 @@ ENDS = {
     ),
     "error": ("numerical error", "numerical error, of time step and stiffness"),
 }
-"""Ends of names of bands and of numerical errors, as in ``velocity_low``: words of their labels, meaning."""
-_PLAIN = ("draws", "approximate")
+"""Ends of the names of the numbers of a band and of numerical errors, as in ``velocity_low``.
+
+The values are the words that the label of the number gets, and the meaning."""
+_ENDS_WITHOUT_UNIT = ("draws", "approximate")
 """Ends of names of numbers without a unit."""
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A column or a number: name, SI unit, label of axes and rows, definition, name of its error or scatter if any.
+    """A column of a table or a number of a result.
 
-    With a ``*`` in its name there is one per bead or contact: ``rotation_1``, ``rotation_2``, …. The unit ``share`` is
-    that of numbers that are shown in per cent.
+    With a ``*`` in its name there is one per bead or contact: ``rotation_1``, ``rotation_2``, ….
+
+    Attributes
+    ----------
+    name
+        Name of the column or number.
+    unit
+        SI unit; ``share`` for numbers that are shown in per cent.
+    label
+        What axes and rows call it.
+    meaning
+        Its definition.
+    error
+        Name of the number that is its error or scatter; empty if there is none.
     """
 
     name: str
@@ -53,14 +68,25 @@ class Quantity:
         return "" if self.unit == "share" else self.unit
 
 
+def _quantity(name: str, entry: str | list[str]) -> Quantity:
+    """A quantity from its entry in the file.
+
+    The entry is a list of unit, label, meaning (the label if it is missing) and name of the error;
+    or what a table adds to the meaning of a shared column.
+    """
+    if isinstance(entry, str):
+        unit, label, *rest = _FILE["shared"][name]
+        meaning, *_ = rest
+        return Quantity(name, unit, label, meaning + entry)
+    unit, label, *rest = entry
+    if not rest:
+        return Quantity(name, unit, label, label)
+    return Quantity(name, unit, label, *rest)
+
+
 def _quantities(entries: Mapping[str, str | list[str]]) -> tuple[Quantity, ...]:
-    """Quantities from their entries: lists, or what a table adds to the meaning of a shared column."""
-    quantities = []
-    for name, entry in entries.items():
-        unit, label, *more = _FILE["shared"][name] if isinstance(entry, str) else entry
-        more = [more[0] + entry] if isinstance(entry, str) else more or [label]
-        quantities.append(Quantity(name, unit, label, *more))
-    return tuple(quantities)
+    """Quantities from their entries in a table of the file."""
+    return tuple(_quantity(name, entry) for name, entry in entries.items())
 
 
 TABLES: Mapping[str, tuple[Quantity, ...]] = {
@@ -70,34 +96,57 @@ TABLES: Mapping[str, tuple[Quantity, ...]] = {
 GROUPS: Mapping[str, tuple[Quantity, ...]] = {
     name: _quantities(group) for name, group in _FILE["numbers"].items()
 }
-"""The numbers of results: of each module of `walkers.postprocess.measure.results.MODULES`, and of all."""
+"""The numbers of results, by the names of the modules that measure them; ``drive`` are of all.
+
+The modules are those of `walkers.postprocess.measure.results.MODULES`."""
 SHOWN: Mapping[str, frozenset[str]] = {
     name: frozenset(names) for name, names in _FILE["shown"].items()
 }
-"""Which numbers are shown (`walkers.postprocess.measure.numbers.rows`), and which are of walkers that face up."""
+"""Which numbers are shown (`walkers.postprocess.measure.numbers.rows`), and which leave out walkers
+that face down."""
 LABELS: Mapping[str, Mapping[str, str]] = _FILE["labels"]
-"""Labels of numbers of walkers that face up or down: on a ``level`` boundary, on a ``slope``, and of ``both``."""
-_NUMBERS = [
-    quantity
-    for number in (number for group in GROUPS.values() for number in group)
-    for quantity in (
-        number,
-        *(
+"""Labels of numbers of walkers that face up or down: on a ``level`` boundary, on a ``slope``, and
+of ``both`` directions."""
+
+
+def _with_ends(number: Quantity) -> list[Quantity]:
+    """A number of results, the numbers of its band, and its numerical error."""
+    quantities = [number]
+    for end, (words, meaning) in ENDS.items():
+        quantities.append(
             Quantity(
-                f"{number.name}_{end}",
-                "" if end in _PLAIN else number.unit,
-                f"{number.label}, {words}",
-                f"{meaning}: {number.meaning}",
+                name=f"{number.name}_{end}",
+                unit="" if end in _ENDS_WITHOUT_UNIT else number.unit,
+                label=f"{number.label}, {words}",
+                meaning=f"{meaning}: {number.meaning}",
             )
-            for end, (words, meaning) in ENDS.items()
-        ),
-    )
-]
+        )
+    return quantities
+
+
+def _all_numbers() -> tuple[Quantity, ...]:
+    """The numbers of results, each with its band and its numerical error."""
+    quantities: list[Quantity] = []
+    for group in GROUPS.values():
+        for number in group:
+            quantities += _with_ends(number)
+    return tuple(quantities)
+
+
+_NUMBERS = _all_numbers()
 """The numbers of results, each with its band and its numerical error."""
 
 
 def matches(pattern: str, name: str) -> bool:
-    """Whether a name is the pattern, or has a number in place of its ``*``: ``rotation_2`` of ``rotation_*``."""
+    """Tell whether a name is a pattern, or has a number in place of its ``*``.
+
+    Parameters
+    ----------
+    pattern
+        Name of a quantity, such as ``rotation_*``.
+    name
+        Name of a column or number, such as ``rotation_2``.
+    """
     if "*" not in pattern:  # most have none, and a pattern takes long to compile
         return pattern == name
     return bool(re.fullmatch(pattern.replace("*", r"\d+"), name))
@@ -105,7 +154,24 @@ def matches(pattern: str, name: str) -> bool:
 
 @cache
 def declared(name: str, table: str = "") -> Quantity:
-    """The quantity of a number of a result, or of a column of a table; `KeyError` if there is none.
+    """Find the quantity of a number of a result, or of a column of a table.
+
+    Parameters
+    ----------
+    name
+        Name of the number or column.
+    table
+        Name of the table; empty for a number of a result.
+
+    Returns
+    -------
+    Quantity
+        With this name, and the number of the bead or contact in its label.
+
+    Raises
+    ------
+    KeyError
+        If there is none.
 
     Examples
     --------
@@ -114,23 +180,27 @@ def declared(name: str, table: str = "") -> Quantity:
     """
     for quantity in TABLES[table] if table else _NUMBERS:
         if matches(quantity.name, name):
-            number = re.search(r"_(\d+)", name) if "*" in quantity.name else None
-            return replace(
-                quantity, name=name, label=quantity.label.replace("*", number[1] if number else "*")
-            )
+            label = quantity.label
+            if "*" in quantity.name:
+                number = re.search(r"_(\d+)", name)
+                label = label.replace("*", number[1] if number else "*")
+            return replace(quantity, name=name, label=label)
     raise KeyError(name)
 
 
 def is_declared(name: str) -> bool:
-    """Whether a name is that of a number of a result."""
-    with suppress(KeyError):
-        return bool(declared(name))
-    return False
+    """Tell whether a name is that of a number of a result."""
+    try:
+        declared(name)
+    except KeyError:
+        return False
+    return True
 
 
 def is_error(name: str) -> bool:
-    """Whether a number belongs to the band of another, or is its numerical error."""
-    return name.rpartition("_")[2] in ENDS
+    """Tell whether a number belongs to the band of another, or is its numerical error."""
+    _, _, end = name.rpartition("_")
+    return end in ENDS
 
 
 def scatter_of(name: str) -> str:
@@ -139,15 +209,16 @@ def scatter_of(name: str) -> str:
 
 
 def ordered(names: Iterable[str]) -> list[str]:
-    """Names of numbers in the order of their declarations; both ends of a band follow the number."""
+    """Sort names of numbers by their declarations; the ends of a band follow the number."""
     places = {quantity.name: place for place, quantity in enumerate(_NUMBERS)}
-    return sorted(
-        names,
-        key=lambda name: (
-            places.get(re.sub(r"_\d+(?=_|$)", "_*", name), places.get(name, -1)),
-            name,
-        ),
-    )
+
+    def place_and_name(name: str) -> tuple[int, str]:
+        """Place of the declaration; numbers of one declaration are sorted by their names."""
+        pattern = re.sub(r"_\d+(?=_|$)", "_*", name)
+        place = places.get(pattern, places.get(name, -1))
+        return place, name
+
+    return sorted(names, key=place_and_name)
 
 
 def described_columns(names: Iterable[str]) -> dict[str, tuple[str, str]]:
@@ -162,7 +233,21 @@ def unit_shown(unit: str) -> tuple[str, float]:
 
 
 def axis(table: str, name: str) -> tuple[str, float]:
-    """Label of an axis with the displayed unit, and the factor from SI units.
+    """Label an axis of a figure.
+
+    Parameters
+    ----------
+    table
+        Name of the table; empty for a number of a result.
+    name
+        Name of the column or number.
+
+    Returns
+    -------
+    label : str
+        With the displayed unit.
+    factor : float
+        How many displayed units one SI unit is.
 
     Examples
     --------
@@ -171,4 +256,5 @@ def axis(table: str, name: str) -> tuple[str, float]:
     """
     quantity = declared(name, table)
     unit, factor = unit_shown(quantity.unit)
-    return f"{quantity.label} ({unit})" if unit else quantity.label, factor
+    label = f"{quantity.label} ({unit})" if unit else quantity.label
+    return label, factor
