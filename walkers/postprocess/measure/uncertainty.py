@@ -1,10 +1,13 @@
-"""Uncertainty of a result: unmeasured values, and the band of the result over their ranges."""
+"""Uncertainty of a result: unmeasured values, and the band of the result over their ranges.
+
+It reads what `walkers.sweeps.spread` and `walkers.sweeps.accuracy` have written beside and in a run
+directory. It runs nothing.
+"""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Collection, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -17,91 +20,164 @@ from walkers.inputs.resolving.library import unmeasured
 from walkers.runner.manifest import check_unchanged
 
 SPREAD = "-spread"
+"""End of the name of the directory of a spread (`spread_of`)."""
 SPREAD_NAME = "spread.json"
-"""End of the name of a spread's directory (`spread_of`), and name of the file with the bands in it."""
+"""Name of the file with the bands in the directory of a spread."""
 ACCURACY = "-accuracy"
+"""End of the name of the sweep that measures numerical errors."""
 ACCURACY_NAME = "accuracy.json"
-"""End of the name of the sweep that measures numerical errors, and name of the file with them in the run."""
+"""Name of the file with the numerical errors in a run directory."""
 LEAST_PER_VALUE = 3
 """Least number of draws per varied value (`few_draws`)."""
 _LEAST = 6
 """Least number of draws: of five, no rank correlation is larger than two standard errors, 2/√4."""
-_WIDTH = 110
+_TERMINAL_WIDTH = 110
+"""Width of lines for a terminal, characters."""
+_HEAD_WIDTH = 13
+"""Width of the head beside which wrapped lines stand, characters."""
+_HEADS = ("guessed", "uncertain", "given", "calibrated", "assumed", "library", "own library")
+"""Heads of the lines of `uncertain_value_lines`, in their order."""
 
 
 def uncertain_values(origins: Sequence[Origin]) -> list[dict[str, Any]]:
-    """Unmeasured values of a case, and values that it calls uncertain.
+    """List the values of a case that nobody has measured, and those that it calls uncertain.
 
-    Each has a ``key``, ``value`` (as in a case file), ``origin`` (``given``, ``library``, ``calibrated``, ``assumed``
-    or ``default``), ``range`` (both ends, or None), ``logarithmic``, and whether it is ``guessed``.
+    Parameters
+    ----------
+    origins
+        Sources of the values of the case.
+
+    Returns
+    -------
+    list of dict
+        For each value ``key``, ``value`` (as in a case file), ``origin`` (``given``, ``library``,
+        ``calibrated``, ``assumed`` or ``default``), ``range`` (both ends, or None),
+        ``logarithmic``, and whether it is ``guessed``.
     """
-    return [
-        {
-            "key": value.key,
-            "value": value.text,
-            "origin": value.origin,
-            "range": list(value.range) if value.range else None,  # a list, as in the file
-            "logarithmic": value.logarithmic,
-            "guessed": value.guessed,
-        }
-        for value in origins
-        if value.key in unmeasured() or value.range is not None
-    ]
+    values = []
+    for origin in origins:
+        if origin.key not in unmeasured() and origin.range is None:
+            continue
+        values.append(
+            {
+                "key": origin.key,
+                "value": origin.text,
+                "origin": origin.origin,
+                "range": list(origin.range) if origin.range else None,  # a list, as in the file
+                "logarithmic": origin.logarithmic,
+                "guessed": origin.guessed,
+            }
+        )
+    return values
 
 
-_HEADS = ("guessed", "uncertain", "given", "calibrated", "assumed", "library", "own library")
+def uncertain_value_lines(values: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Write uncertain values as lines for a terminal, by their origin.
+
+    Parameters
+    ----------
+    values
+        Values of `uncertain_values`.
+
+    Returns
+    -------
+    list of str
+        The lines; none without values.
+    """
+    values_by_head: dict[str, list[str]] = {}
+    for value in values:
+        values_by_head.setdefault(_head_of(value), []).append(_value_text(value))
+    if "guessed" in values_by_head:
+        values_by_head["guessed"][-1] += " (not of these materials and this liquid)"
+    lines: list[str] = []
+    for head in _HEADS:
+        if head in values_by_head:
+            lines += wrapped_lines(f"  {head:10} {', '.join(values_by_head[head])}")
+    return lines
 
 
-def uncertain_value_lines(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The uncertain values of a result (`uncertain_values`) as text, by origin; those of other materials are guessed."""
-    listed: dict[str, list[str]] = {}
-    for value in rests:
-        guess = "guessed" if value["origin"] == "default" else "uncertain"
-        values = listed.setdefault(guess if value["guessed"] else value["origin"], [])
-        values.append(f"{value['key'].partition('.')[2]} {value['value']}")
-    if "guessed" in listed:
-        listed["guessed"][-1] += " (not of these materials and this liquid)"
-    texts = [f"  {head:10} {', '.join(listed[head])}" for head in _HEADS if head in listed]
-    return [line for text in texts for line in wrapped_lines(text)]
+def _head_of(value: Mapping[str, Any]) -> str:
+    """The head below which an uncertain value is listed."""
+    if not value["guessed"]:
+        return str(value["origin"])
+    return "guessed" if value["origin"] == "default" else "uncertain"
 
 
-def guesses(rests: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Values of a result (`uncertain_values`) that the program guessed, as text: ``friction.bead_wall 0.25``."""
-    return [
-        f"{value['key'].partition('.')[2]} {value['value']}"
-        for value in rests
-        if value["guessed"] and value["origin"] == "default"
-    ]
+def _value_text(value: Mapping[str, Any]) -> str:
+    """An uncertain value with its key in its table: ``bead_wall 0.25``."""
+    _, _, key_in_table = value["key"].partition(".")
+    return f"{key_in_table} {value['value']}"
+
+
+def guesses(values: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Write the uncertain values that the program guessed: ``bead_wall 0.25``.
+
+    Parameters
+    ----------
+    values
+        Values of `uncertain_values`.
+    """
+    guessed = [value for value in values if _head_of(value) == "guessed"]
+    return [_value_text(value) for value in guessed]
 
 
 def wrapped_lines(text: str) -> list[str]:
-    """A text beside a head of 13 letters, in lines for a terminal."""
-    return textwrap.wrap(text, _WIDTH, subsequent_indent=" " * 13, break_on_hyphens=False)
+    """Wrap a text for a terminal; its further lines stand beside its head of 13 characters."""
+    indent = " " * _HEAD_WIDTH
+    return textwrap.wrap(text, _TERMINAL_WIDTH, subsequent_indent=indent, break_on_hyphens=False)
 
 
 def fixed_values(origins: Sequence[Origin]) -> tuple[Origin, ...]:
-    """Values of a case without a range, which a spread holds fixed: those of the liquid, and other unmeasured ones."""
+    """Values that a spread keeps fixed, because they have no range.
+
+    Parameters
+    ----------
+    origins
+        Sources of the values of a case.
+
+    Returns
+    -------
+    tuple of Origin
+        Those of the liquid, and other unmeasured ones.
+    """
     keys = {"liquid.name", *OF_LIQUIDS, *unmeasured()}
-    return tuple(
-        value
-        for value in origins
-        if value.key in keys and value.origin != "derived" and not value.range
-    )
+    without_range = [value for value in origins if value.key in keys and not value.range]
+    return tuple(value for value in without_range if value.origin != "derived")
 
 
-def fixed_values_text(held: Sequence[Origin]) -> str:
-    """Values that a spread holds fixed (`fixed_values`), those of the liquid first and with its name."""
-    name = "".join(f" ({value.text})" for value in held if value.key == "liquid.name")
-    of_liquid, unknown = (
-        ", ".join(f"{value.key} {value.text}" for value in held if value.key in keys)
-        for keys in (OF_LIQUIDS, unmeasured())
-    )
-    listed = ", ".join(filter(None, [f"{of_liquid}{name}" if of_liquid else "", unknown]))
-    return f"{listed}{' and ' if listed else ''}all other values; to vary one, add its range in [uncertain]"
+def fixed_values_text(values: Sequence[Origin]) -> str:
+    """Write the values that a spread keeps fixed.
+
+    Parameters
+    ----------
+    values
+        Values of `fixed_values`.
+
+    Returns
+    -------
+    str
+        The values of the liquid, its name, and the other values.
+    """
+    liquid = _key_and_value(values, OF_LIQUIDS)
+    if liquid:
+        names = [f" ({value.text})" for value in values if value.key == "liquid.name"]
+        liquid += "".join(names)
+    other = _key_and_value(values, unmeasured())
+    listed = ", ".join(text for text in (liquid, other) if text)
+    rest = "all other values; to vary one, add its range in [uncertain]"
+    return f"{listed} and {rest}" if listed else rest
+
+
+def _key_and_value(values: Sequence[Origin], keys: Collection[str]) -> str:
+    """The values that have some keys, as text."""
+    return ", ".join(f"{value.key} {value.text}" for value in values if value.key in keys)
 
 
 def few_draws(draws: int, values: int) -> bool:
-    """Whether draws of some values are too few: the band is approximate, and rank correlations are not significant."""
+    """Tell whether a spread has too few draws for the number of its varied values.
+
+    Then its bands are approximate, and its rank correlations are not significant.
+    """
     return draws < max(_LEAST, LEAST_PER_VALUE * values)
 
 
@@ -111,46 +187,87 @@ def spread_of(directory: Path) -> Path:
 
 
 def bands_of(
-    directory: Path, rests: Sequence[Mapping[str, Any]], numbers: Mapping[str, Any]
+    directory: Path, values: Sequence[Mapping[str, Any]], numbers: Mapping[str, Any]
 ) -> dict[str, float]:
-    """Bands of numbers (SI) by the spread beside a run: ``velocity_low``, ``velocity_high``, ``velocity_draws``, ….
+    """Read the bands of numbers from the spread beside a run.
 
-    The spread must be over the ranges of the uncertain values ``rests``. A band is extended to the number of the case,
-    which is usually in it, because a spread draws half of the values below and half above those of the case.
+    Parameters
+    ----------
+    directory
+        The run directory.
+    values
+        The uncertain values of the case (`uncertain_values`). The spread counts only if it is over
+        their ranges.
+    numbers
+        The numbers of the result, SI units.
+
+    Returns
+    -------
+    dict of str to float
+        ``velocity_low``, ``velocity_high``, ``velocity_draws``, ``velocity_approximate``, …; empty
+        without such a spread, or if its file cannot be read. A band is extended to the number of
+        the case, which is usually in it, because a spread draws half of the values below and half
+        above those of the case.
     """
     bands: dict[str, float] = {}
-    with suppress(OSError, ValueError, KeyError, TypeError):
+    try:
         spread = read_json(spread_of(directory.resolve()) / SPREAD_NAME)
-        drawn, ranges = (
-            {value["key"]: value["range"] for value in part if value["range"]}
-            for part in (spread["varied"], rests)
-        )
-        for name, band in spread["bands"].items() if drawn == ranges else ():
-            number = numbers.get(name)
-            ends = [
-                band["low"],
-                band["high"],
-                *([number] if number is not None and isfinite(number) else []),
-            ]
-            bands |= {
-                f"{name}_low": min(ends),
-                f"{name}_high": max(ends),
-                f"{name}_draws": band["points"],
-            }
-            bands[f"{name}_approximate"] = few_draws(band["points"], len(drawn))
+        ranges = _ranges(spread["varied"])
+        if ranges == _ranges(values):
+            for name, band in spread["bands"].items():
+                bands |= _band_numbers(name, band, numbers.get(name), len(ranges))
+    except (OSError, ValueError, KeyError, TypeError):
+        pass  # there is no spread, or its file is damaged; bands read before count
     return bands
 
 
+def _ranges(values: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Ranges of uncertain values by their keys."""
+    return {value["key"]: value["range"] for value in values if value["range"]}
+
+
+def _band_numbers(
+    name: str, band: Mapping[str, Any], number: float | None, varied_values: int
+) -> dict[str, float]:
+    """Both ends of a band, which contains the number of the case, and its draws."""
+    ends = [band["low"], band["high"]]
+    if number is not None and isfinite(number):
+        ends.append(number)
+    return {
+        f"{name}_low": min(ends),
+        f"{name}_high": max(ends),
+        f"{name}_draws": band["points"],
+        f"{name}_approximate": few_draws(band["points"], varied_values),
+    }
+
+
 def accuracy_of(directory: Path) -> dict[str, Any]:
-    """The recorded numerical errors of a run (`walkers.sweeps.accuracy`), if any; `InputError` for edited files."""
-    if not (directory / ACCURACY_NAME).is_file():
+    """Read the recorded numerical errors of a run (`walkers.sweeps.accuracy`).
+
+    Parameters
+    ----------
+    directory
+        The run directory.
+
+    Returns
+    -------
+    dict
+        The contents of ``accuracy.json``; empty if there is no such file.
+
+    Raises
+    ------
+    InputError
+        If the file was edited or is damaged.
+    """
+    path = directory / ACCURACY_NAME
+    if not path.is_file():
         return {}
     try:
-        contents = read_json(directory / ACCURACY_NAME)
+        contents = read_json(path)
         check_unchanged(directory, [ACCURACY_NAME])
-        return contents
     except (OSError, ValueError) as error:
-        text = "was edited or is damaged; measure it again with"
         raise input_error(
-            directory / ACCURACY_NAME, f"{text}: walkers run {directory} --accuracy"
+            path,
+            f"was edited or is damaged; measure it again with: walkers run {directory} --accuracy",
         ) from error
+    return contents
