@@ -1,15 +1,15 @@
 """Results of runs: measured and written once, read by all.
 
-A result is flat: a number of each name of `walkers.postprocess.measure.quantities.GROUPS`. The modules
-of `MODULES` that apply to a case measure its runs. ``result.json`` contains their versions: it is
-outdated if one of these modules, or what all results have in common, has another version now. Runs
-without dumps, such as those of a spread, cannot be measured again, and a change of a module that did
-not measure them must not cost them.
+A result is flat: a number of each name of `walkers.postprocess.measure.quantities.GROUPS`. The
+modules of `MODULES` that apply to a case measure its runs. ``result.json`` contains their versions:
+it is outdated if one of these modules, or what all results have in common, has another version now.
+Runs without dumps, such as those of a spread, cannot be measured again, so a change of a module
+must not outdate the results that other modules measured.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
@@ -22,8 +22,8 @@ from walkers.inputs.resolving.loads import gravity_warnings, softness_warning
 from walkers.postprocess.measure import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.measure.caption import conditions
 from walkers.postprocess.measure.measuring_module import MeasuringModule
-from walkers.postprocess.measure.motion import read_motion
-from walkers.postprocess.measure.numbers import MAIN_NUMBERS, headline, rows, state
+from walkers.postprocess.measure.motion import Motion, read_motion
+from walkers.postprocess.measure.numbers import MAIN_NUMBERS, Row, headline, rows, state
 from walkers.postprocess.measure.tables import Columns, read_columns, read_table, write_table
 from walkers.postprocess.measure.uncertainty import (
     accuracy_of,
@@ -48,22 +48,26 @@ if TYPE_CHECKING:
     from walkers.inputs.tables.case import Case
 
 VERSION = 2
-"""Version of what all results have in common: the format of ``result.json`` and the numbers, tables and warnings that
-no module gives. Results of another version are measured again, whatever modules measured them.
+"""Version of what all results have in common.
+
+That is the format of ``result.json``, and the numbers, tables and warnings that no module gives.
+Results of another version are measured again, whatever modules measured them.
 """
 MODULES: tuple[MeasuringModule, ...] = (walking, threshold, meetings, piles, record_part)
 """The modules that measure runs, in the order of their numbers in results."""
 _BEFORE_MODULES = 2
 """Version of all modules in results that do not contain versions of modules."""
-_BESIDE = ("case", "drive", "rests_on", "by_hand", "tables", "warnings")
-"""Entries of ``result.json`` beside the numbers."""
-_DRIVE = ("frequency", "peak_acceleration", "peak_velocity", "amplitude")
+_ENTRIES = ("case", "drive", "rests_on", "by_hand", "tables", "warnings")
+"""Entries that ``result.json`` has besides the numbers."""
+_DRIVE_NUMBERS = ("frequency", "peak_acceleration", "peak_velocity", "amplitude")
+"""Numbers of all results that follow from the drive."""
 
 
 class Results(dict[str, Any]):
     """The result of a run: numbers in SI units by name; NaN if one is not defined.
 
-    With both ends of bands (``velocity_low``, ``velocity_high``) and numerical errors if these exist.
+    It contains both ends of bands (``velocity_low``, ``velocity_high``) and numerical errors if
+    these exist.
 
     Attributes
     ----------
@@ -72,9 +76,10 @@ class Results(dict[str, Any]):
     warnings
         Reasons to doubt the numbers.
     about
-        ``case``, ``drive``, ``rests_on`` (`walkers.postprocess.measure.uncertainty.uncertain_values`),
-        ``by_hand`` (notes on a deck that was run by hand), ``deck_edited`` (whether its parameters or
-        commands are not those of the program), ``tables`` (their names).
+        ``case``, ``drive``, ``rests_on``
+        (`walkers.postprocess.measure.uncertainty.uncertain_values`), ``by_hand`` (notes on a deck
+        that was run by hand), ``deck_edited`` (whether its parameters or commands are not those of
+        the program), ``tables`` (their names).
     """
 
     def __init__(
@@ -85,7 +90,9 @@ class Results(dict[str, Any]):
         about: Mapping[str, Any],
     ) -> None:
         super().__init__(numbers)
-        self.directory, self.warnings, self.about = directory, warnings, about
+        self.directory = directory
+        self.warnings = warnings
+        self.about = about
 
     def columns(self, table: str) -> Columns:
         """A table as arrays."""
@@ -106,8 +113,19 @@ def modules_of(case: Case) -> list[MeasuringModule]:
 
 
 def derived(case: Case) -> dict[str, Any]:
-    """Numbers of a result that follow from the case alone."""
-    numbers = {name: getattr(case.excitation, name) for name in _DRIVE}
+    """Compute the numbers of a result that follow from the case alone.
+
+    Parameters
+    ----------
+    case
+        The case.
+
+    Returns
+    -------
+    dict of str to number
+        Numbers of the drive and of the modules that measure the case, SI units.
+    """
+    numbers = {name: getattr(case.excitation, name) for name in _DRIVE_NUMBERS}
     for module in modules_of(case):
         numbers |= module.derived(case)
     return numbers
@@ -116,30 +134,35 @@ def derived(case: Case) -> dict[str, Any]:
 def measure(directory: Path) -> None:
     """Measure a run, finished or not; write its tables and, last, ``result.json``.
 
-    `walkers.postprocess.measure.dump.DumpError` if a dump cannot be read,
-    `walkers.runner.manifest.FileChanged` if it changed.
+    Parameters
+    ----------
+    directory
+        The run directory.
+
+    Raises
+    ------
+    walkers.postprocess.measure.dump.DumpError
+        If a dump cannot be read.
+    walkers.runner.manifest.FileChanged
+        If a dump has changed.
     """
     check_unchanged(directory, files_of_segments(directory))
     motion = read_motion(directory)
     case = motion.case
     modules = modules_of(case)
-    parts = [module.measure(motion) for module in modules]
-    tables = {name: columns for part in parts for name, columns in part.tables.items()}
-    numbers = derived(case) | {"goes_uphill": case.goes_uphill, "truncated": motion.truncated}
-    for part in parts:
-        numbers |= part.numbers
+    numbers = derived(case)
+    numbers["goes_uphill"] = case.goes_uphill
+    numbers["truncated"] = motion.truncated
+    tables: dict[str, Columns] = {}
     segment = read_json(segment_directories(directory)[-1] / SEGMENT_NAME)
     notes = segment.get("by_hand") or []
-    warnings = [*notes, *(warning for part in parts for warning in part.warnings)]
-    if names := limits_of(case).exceeded_by(case.run.time_step):
-        warnings.append(
-            f"the time step is beyond a limit of stability ({', '.join(names)}): the results are wrong"
-        )
-    if (softness := softness_warning(case)) is not None:
-        warnings.append(softness)
-    warnings += gravity_warnings(case)
-    if motion.truncated:
-        warnings.append("the dump ends within a frame")
+    warnings = list(notes)
+    for module in modules:
+        measurement = module.measure(motion)
+        tables |= measurement.tables
+        numbers |= measurement.numbers
+        warnings += measurement.warnings
+    warnings += _general_warnings(motion)
     contents = {
         "version": VERSION,
         "modules": {module.NAME: module.VERSION for module in modules},
@@ -152,41 +175,72 @@ def measure(directory: Path) -> None:
         "numbers": json_numbers(numbers),
         "warnings": warnings,
     }
-    with recomputed(directory, [*(f"{name}.parquet" for name in tables), RESULT_NAME]):
+    files = [f"{name}.parquet" for name in tables]
+    files.append(RESULT_NAME)
+    with recomputed(directory, files):
         for name, columns in tables.items():
             write_table(directory, name, columns)
         write_json(directory / RESULT_NAME, contents)
 
 
-def read_results(directory: str | Path, origins: Sequence[Origin] | None = None) -> Results:
-    """The result of a run, with the bands of a spread beside it and its numerical errors; nothing is written.
+def _general_warnings(motion: Motion) -> list[str]:
+    """Reasons to doubt a result that do not depend on what is measured."""
+    case = motion.case
+    warnings = []
+    exceeded_limits = limits_of(case).exceeded_by(case.run.time_step)
+    if exceeded_limits:
+        warnings.append(
+            "the time step is beyond a limit of stability "
+            f"({', '.join(exceeded_limits)}): the results are wrong"
+        )
+    softness = softness_warning(case)
+    if softness is not None:
+        warnings.append(softness)
+    warnings += gravity_warnings(case)
+    if motion.truncated:
+        warnings.append("the dump ends within a frame")
+    return warnings
 
-    ``origins`` are the sources of the values of the case, if they are not those of the case that made the run.
-    `InputError` if the result is missing, damaged or of another version.
+
+def read_results(directory: str | Path, origins: Sequence[Origin] | None = None) -> Results:
+    """Read the result of a run, with the bands of a spread beside it and its numerical errors.
+
+    Nothing is written.
+
+    Parameters
+    ----------
+    directory
+        The run directory.
+    origins
+        Sources of the values of the case, if they are not those of the case that made the run.
+
+    Raises
+    ------
+    InputError
+        If the result is missing, damaged or of another version.
     """
     directory = Path(directory)
     about = recorded(directory)
-    numbers, warnings = about.pop("numbers"), about.pop("warnings")
+    numbers = about.pop("numbers")
+    warnings = list(about.pop("warnings"))
     if origins is not None:
         about["rests_on"] = uncertain_values(origins)
     numbers |= bands_of(directory, about["rests_on"], numbers)
     accuracy = accuracy_of(directory)
-    numbers |= {
-        f"{name}_error": error["total"] for name, error in accuracy.get("errors", {}).items()
-    }
-    if (main := f"{headline(numbers)}_error") in numbers:
-        numbers["numerical_error"] = numbers[main]
+    for name, error in accuracy.get("errors", {}).items():
+        numbers[f"{name}_error"] = error["total"]
+    main_error = f"{headline(numbers)}_error"
+    if main_error in numbers:
+        numbers["numerical_error"] = numbers[main_error]
     if not accuracy.get("reached", True):
         change = percent(float(f"{accuracy['change']:.2g}"))
-        warnings = [
-            *warnings,
-            f"the numerical error is not converged: the hardest beads still change {change}",
-        ]
+        warnings.append(
+            f"the numerical error is not converged: the hardest beads still change {change}"
+        )
     if accuracy.get("times") == 1.0:
-        warnings = [
-            *warnings,
-            "the beads cannot be harder: the numerical error is that of the time step alone",
-        ]
+        warnings.append(
+            "the beads cannot be harder: the numerical error is that of the time step alone"
+        )
     return Results(directory, numbers, warnings, about)
 
 
@@ -201,7 +255,7 @@ def recorded(directory: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        The numbers as ``numbers``, NaN if one is not defined, and the entries beside them.
+        The numbers as ``numbers``, NaN if one is not defined, and the other entries of the file.
 
     Raises
     ------
@@ -212,16 +266,18 @@ def recorded(directory: Path) -> dict[str, Any]:
     try:
         contents = read_json(directory / RESULT_NAME)
         version = contents.pop("version")
-        versions = contents.pop("modules", None)
-        if versions is not None:
-            versions = dict(versions)
-        _ = [contents[name] for name in _BESIDE]
-        numbers = {
-            name: nan if number is None else number for name, number in contents["numbers"].items()
-        }
-        if version == VERSION:  # every reader needs these numbers
-            _ = numbers["goes_uphill"], "velocity" in numbers and numbers["facings_differ"]
+        versions_of_modules = contents.pop("modules", None)
+        if versions_of_modules is not None:
+            versions_of_modules = dict(versions_of_modules)
+        _check_names(contents, _ENTRIES)
+        numbers = {}
+        for name, number in contents["numbers"].items():
+            numbers[name] = nan if number is None else number
         contents["numbers"] = numbers
+        if version == VERSION:
+            _check_names(numbers, ["goes_uphill"])
+            if "velocity" in numbers:
+                _check_names(numbers, ["facings_differ"])
     except FileNotFoundError as error:
         raise input_error(directory, f"has no {RESULT_NAME}; {again}") from error
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
@@ -230,12 +286,19 @@ def recorded(directory: Path) -> dict[str, Any]:
         ) from error
     contents.setdefault("deck_edited", False)  # earlier results lack it
     try:
-        outdated = version != VERSION or _is_outdated(directory, versions)
+        outdated = version != VERSION or _is_outdated(directory, versions_of_modules)
     except (OSError, ValueError) as error:
         raise input_error(directory, f"its case cannot be read ({error})") from error
     if outdated:
         raise input_error(directory, f"was measured by another version of the program; {again}")
     return contents
+
+
+def _check_names(entries: Mapping[str, Any], names: Iterable[str]) -> None:
+    """Raise `KeyError` for the first name that is missing; every reader needs these entries."""
+    for name in names:
+        if name not in entries:
+            raise KeyError(name)
 
 
 def _is_outdated(directory: Path, versions: Mapping[str, Any] | None) -> bool:
@@ -246,62 +309,89 @@ def _is_outdated(directory: Path, versions: Mapping[str, Any] | None) -> bool:
     """
     if versions is None:
         changed = [module for module in MODULES if module.VERSION != _BEFORE_MODULES]
-        return bool(changed) and any(module.applies(case_of(directory)) for module in changed)
+        if not changed:
+            return False
+        case = case_of(directory)
+        return any(module.applies(case) for module in changed)
     present = {module.NAME: module.VERSION for module in MODULES}
     return any(present.get(name) != version for name, version in versions.items())
 
 
 def ensure_measured(directory: Path) -> None:
-    """Measure (`measure`) a finished run again if a file of its result is missing, damaged, edited or outdated."""
+    """Measure a finished run again if a file of its result is missing, damaged or outdated.
+
+    Parameters
+    ----------
+    directory
+        The run directory. A file of its result that was edited counts as damaged; `measure` raises
+        the errors.
+    """
     try:
-        names = [RESULT_NAME, *(f"{name}.parquet" for name in recorded(directory)["tables"])]
+        names = [RESULT_NAME]
+        names += [f"{name}.parquet" for name in recorded(directory)["tables"]]
         if check_unchanged(directory, names):
             return
     except (InputError, OSError, ValueError):
-        pass
+        pass  # `measure` says what is wrong, if it cannot mend it
     measure(directory)
 
 
 def json_numbers(numbers: Mapping[str, Any]) -> dict[str, Any]:
-    """Numbers as JSON types: None for those that are not finite."""
-    json_numbers = {
-        name: number.item() if hasattr(number, "item") else number
-        for name, number in numbers.items()
-    }
-    return {
-        name: None if isinstance(value, float) and not isfinite(value) else value
-        for name, value in json_numbers.items()
-    }
+    """Convert numbers to JSON types: None for those that are not finite."""
+    return {name: _json_number(number) for name, number in numbers.items()}
+
+
+def _json_number(number: Any) -> Any:
+    """A number as JSON type."""
+    plain = number.item() if hasattr(number, "item") else number
+    if isinstance(plain, float) and not isfinite(plain):
+        return None
+    return plain
 
 
 def text(results: Results, *, cached: bool = False) -> str:
-    """A result in lines: state or drive, what is not computed, numbers, warnings, origins of values, directory."""
+    """Write a result as lines for a terminal.
+
+    Parameters
+    ----------
+    results
+        The result.
+    cached
+        Whether the run had been made before, which the first line then says.
+
+    Returns
+    -------
+    str
+        State or drive, uncertainties that are not computed, numbers, warnings, origins of uncertain
+        values, and the directory.
+    """
     first, *rest = headlines(results)
     if cached and not results.about["by_hand"]:  # it was never made by a command
         first += " (already run)"
-    table = [(row.label, row.text, row.unit, row.error) for row in rows(results)]
-    label, value, unit = (max((len(row[place]) for row in table), default=0) for place in range(3))
-    missing = []
-    if lacks := not_computed(results):
-        missing.append(f"  uncertainty not computed: {lacks.text}")
-    banded = []
+    lines = [first]
+    lines += [f"  {line}" for line in rest]
+    missing = not_computed(results)
+    if missing:
+        lines.append(f"  uncertainty not computed: {missing.text}")
+    lines += _lines_of_numbers(rows(results))
+    lines += [f"  warning: {warning}" for warning in results.warnings]
+    lines += uncertain_value_lines(results.about["rests_on"])
     if has_band(results):
-        banded.append(f"  band       {BAND_NOTE}")
-    return "\n".join(
-        [
-            first,
-            *(f"  {line}" for line in rest),
-            *missing,
-            *(
-                f"  {row[0]:{label}}  {row[1]:>{value}} {row[2]:{unit}}  {row[3]}".rstrip()
-                for row in table
-            ),
-            *(f"  warning: {warning}" for warning in results.warnings),
-            *uncertain_value_lines(results.about["rests_on"]),
-            *banded,
-            f"  run        {results.directory}",
-        ]
-    )
+        lines.append(f"  band       {BAND_NOTE}")
+    lines.append(f"  run        {results.directory}")
+    return "\n".join(lines)
+
+
+def _lines_of_numbers(listed: Sequence[Row]) -> list[str]:
+    """Numbers as lines with aligned labels, values, units and errors."""
+    label_width = max((len(row.label) for row in listed), default=0)
+    value_width = max((len(row.text) for row in listed), default=0)
+    unit_width = max((len(row.unit) for row in listed), default=0)
+    lines = []
+    for row in listed:
+        value = f"{row.text:>{value_width}} {row.unit:{unit_width}}"
+        lines.append(f"  {row.label:{label_width}}  {value}  {row.error}".rstrip())
+    return lines
 
 
 @dataclass(frozen=True)
@@ -334,15 +424,16 @@ class NotComputed:
 
 
 def not_computed(results: Results) -> NotComputed:
-    """The uncertainties of the main number of a result that have not been computed."""
+    """Find the uncertainties of the main number of a result that have not been computed."""
     main = headline(results)
     if not main or results.get("came_apart"):
         return NotComputed()
-    values = 0
+    uncertain = 0
     if f"{main}_low" not in results:
-        values = sum(1 for entry in results.about["rests_on"] if entry["range"])
-    has_error = not {"numerical_error", "stops_at"}.isdisjoint(results)
-    return NotComputed(values, "velocity" in results and not has_error)
+        uncertain = len([value for value in results.about["rests_on"] if value["range"]])
+    # A threshold has a resolution instead of a numerical error.
+    has_error = "numerical_error" in results or "stops_at" in results
+    return NotComputed(uncertain, "velocity" in results and not has_error)
 
 
 BAND_NOTE = (
@@ -352,15 +443,19 @@ BAND_NOTE = (
 
 
 def has_band(results: Mapping[str, Any]) -> bool:
-    """Whether a main number of a result has a band."""
+    """Tell whether a main number of a result has a band."""
     return any(f"{name}_low" in results for name in MAIN_NUMBERS)
 
 
 def headlines(results: Results) -> list[str]:
     """The case, its drive, and the state of its walkers."""
+    case = results.about["case"]
     drive = results.about["drive"]
-    if all(isfinite(results.get(name, nan)) for name in ("gamma0", "sin_delta")):
-        drive += f", Γ0 = {results['gamma0']:.3g}, sin δ = {results['sin_delta']:.3g}"
-    if does := state(results):
-        return [f"{results.about['case']}: {does}", drive]
-    return [f"{results.about['case']}: {drive}"]
+    gamma0 = results.get("gamma0", nan)
+    sin_delta = results.get("sin_delta", nan)
+    if isfinite(gamma0) and isfinite(sin_delta):
+        drive += f", Γ0 = {gamma0:.3g}, sin δ = {sin_delta:.3g}"
+    state_of_walkers = state(results)
+    if state_of_walkers:
+        return [f"{case}: {state_of_walkers}", drive]
+    return [f"{case}: {drive}"]
