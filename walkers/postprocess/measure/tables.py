@@ -20,10 +20,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Columns: TypeAlias = dict[str, npt.NDArray[Any]]
+"""Columns of a table by their names, all of one length."""
 
 
 def numbered_columns(name: str, values: npt.NDArray[Any]) -> Columns:
-    """Columns ``name_1``, ``name_2``, … of beads or contacts, which are the last axis of the values."""
+    """Make the columns ``name_1``, ``name_2``, … of values at beads or contacts, the last axis."""
     return {f"{name}_{number + 1}": values[..., number] for number in range(values.shape[-1])}
 
 
@@ -44,45 +45,69 @@ def columns_of(rows: Sequence[Sequence[Any]], types: Mapping[str, type]) -> Colu
 
 
 def write_table(directory: Path, name: str, columns: Columns) -> None:
-    """Write a table of a run.
+    """Write a table of a run as a parquet file.
 
-    KeyError if columns are missing or not in `walkers.postprocess.measure.quantities.TABLES`.
+    Parameters
+    ----------
+    directory
+        The run directory.
+    name
+        Name of the table in `walkers.postprocess.measure.quantities.TABLES`.
+    columns
+        Its columns, SI units.
+
+    Raises
+    ------
+    KeyError
+        If columns are missing or not declared.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    quantities = TABLES[name]
-    order = [
-        column for quantity in quantities for column in columns if matches(quantity.name, column)
-    ]
-    missing = {
-        quantity.name for quantity in quantities if not quantity.name.endswith("_*")
-    } - columns.keys()
-    if wrong := missing | columns.keys() - set(order):
-        raise KeyError(
-            f"columns of {name} that are missing or not declared: {', '.join(sorted(wrong))}"
-        )
-    arrays = [_arrow(columns[column]) for column in order]
+    arrays = []
     fields = []
-    for column, array in zip(order, arrays, strict=True):
-        quantity = declared(column, name)
-        unit = quantity.si_unit  # ``units`` and ``long_name`` are attributes of the CF conventions
-        metadata = {
-            "unit": unit,
-            "meaning": quantity.meaning,
-            "units": unit,
-            "long_name": quantity.label,
-        }
-        fields.append(pa.field(column, array.type, metadata=metadata))
+    for column in _order_of(name, columns):
+        array = _arrow(columns[column])
+        arrays.append(array)
+        fields.append(pa.field(column, array.type, metadata=_metadata(name, column)))
     reals = [field.name for field in fields if pa.types.is_floating(field.type)]
+    others = [field.name for field in fields if field.name not in reals]
     with replacing(directory / f"{name}.parquet") as new:
         pq.write_table(
             pa.Table.from_arrays(arrays, schema=pa.schema(fields)),
             new,
             compression="zstd",
-            use_dictionary=[field.name for field in fields if field.name not in reals],
+            use_dictionary=others,
             use_byte_stream_split=reals,
         )
+
+
+def _order_of(table: str, columns: Columns) -> list[str]:
+    """Names of the columns in the order of their declarations; `KeyError` as in `write_table`."""
+    order: list[str] = []
+    required = set()
+    for quantity in TABLES[table]:
+        order += [column for column in columns if matches(quantity.name, column)]
+        if not quantity.name.endswith("_*"):
+            required.add(quantity.name)
+    missing = required - columns.keys()
+    not_declared = columns.keys() - set(order)
+    wrong = missing | not_declared
+    if wrong:
+        names = ", ".join(sorted(wrong))
+        raise KeyError(f"columns of {table} that are missing or not declared: {names}")
+    return order
+
+
+def _metadata(table: str, column: str) -> dict[str, str]:
+    """Unit, label and meaning of a column; two of the names are those of the CF conventions."""
+    quantity = declared(column, table)
+    return {
+        "unit": quantity.si_unit,
+        "meaning": quantity.meaning,
+        "units": quantity.si_unit,
+        "long_name": quantity.label,
+    }
 
 
 def _arrow(values: npt.NDArray[Any]) -> Any:
@@ -92,33 +117,56 @@ def _arrow(values: npt.NDArray[Any]) -> Any:
     if values.dtype.kind == "U":
         return pa.array(values.tolist(), pa.string())
     if values.dtype == np.bool_:
-        bits = pa.py_buffer(np.packbits(values, bitorder="little").tobytes())
-        return pa.Array.from_buffers(pa.bool_(), len(values), [None, bits])
-    kind = pa.from_numpy_dtype(values.dtype)
-    return pa.Array.from_buffers(
-        kind, len(values), [None, pa.py_buffer(np.ascontiguousarray(values))]
-    )
+        arrow_type = pa.bool_()
+        buffer = pa.py_buffer(np.packbits(values, bitorder="little").tobytes())
+    else:
+        arrow_type = pa.from_numpy_dtype(values.dtype)
+        buffer = pa.py_buffer(np.ascontiguousarray(values))
+    all_valid = None  # no bits that say which values are missing
+    return pa.Array.from_buffers(arrow_type, len(values), [all_valid, buffer])
 
 
 def read_table(directory: str | Path, name: str) -> pd.DataFrame:
-    """Read a table of a run directory, such as ``trajectory``, ``walkers`` or ``bed``, into pandas, SI units.
+    """Read a table of a run into pandas.
 
-    ``attrs["units"]`` and ``attrs["long_name"]`` map its columns to units and labels. `InputError` if the directory has
-    no such table, or it is damaged.
+    Parameters
+    ----------
+    directory
+        The run directory.
+    name
+        Name of the table, such as ``trajectory``, ``walkers`` or ``bed``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        SI units; ``attrs["units"]`` and ``attrs["long_name"]`` map its columns to units and labels.
+
+    Raises
+    ------
+    InputError
+        If the directory has no such table, or it is damaged.
     """
     table = _read(Path(directory), name)
     frame: pd.DataFrame = table.to_pandas()
-    for name_of in ("units", "long_name"):
-        frame.attrs[name_of] = {
-            field.name: field.metadata[name_of.encode()].decode() for field in table.schema
+    for attribute in ("units", "long_name"):
+        frame.attrs[attribute] = {
+            field.name: field.metadata[attribute.encode()].decode() for field in table.schema
         }
     return frame
 
 
 def read_columns(directory: Path, name: str) -> Columns:
-    """Like `read_table`, as arrays without pandas."""
+    """Read a table of a run as arrays; errors are those of `read_table`.
+
+    Parameters
+    ----------
+    directory
+        The run directory.
+    name
+        Name of the table.
+    """
     table = _read(directory, name)
-    return {name: _numpy(table[name]) for name in table.column_names}
+    return {column: _numpy(table[column]) for column in table.column_names}
 
 
 def _numpy(column: Any) -> npt.NDArray[Any]:
@@ -140,13 +188,15 @@ def _numpy(column: Any) -> npt.NDArray[Any]:
 
 
 def _read(directory: Path, name: str) -> Any:
+    """The arrow table of a run; errors are those of `read_table`."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     path = directory / f"{name}.parquet"
     if not path.exists():
-        tables = ", ".join(sorted(path.stem for path in directory.glob("*.parquet")))
-        raise input_error(directory, f"has no table {name}; it has {tables or 'none'}")
+        tables = sorted(file.stem for file in directory.glob("*.parquet"))
+        present = ", ".join(tables) if tables else "none"
+        raise input_error(directory, f"has no table {name}; it has {present}")
     try:
         # Not pq.read_table, which imports pandas and pyarrow.dataset: a third of a second.
         return pq.ParquetFile(pa.BufferReader(read_regular(path))).read()
