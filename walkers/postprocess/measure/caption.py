@@ -10,7 +10,7 @@ from walkers.rounding import counted
 
 
 def caption(case: Case) -> str:
-    """A case in one line: bodies, surface, liquid, drive and tilt.
+    """Describe a case in one line: bodies, surface, liquid, drive and tilt.
 
     Examples
     --------
@@ -18,34 +18,34 @@ def caption(case: Case) -> str:
     >>> caption(load_case("fig4a"))
     '6 walkers of R = 0.6 / 0.3 mm on a plane of glass, Si AK5; 80 Hz, a0 = 19.6 m/s²'
     """
-    bodies = [
-        f"{counted(kind.replicates, 'walker')} of R = {radii_text(kind.radii)} mm"
-        for kind in case.walkers
-    ]
+    bodies = []
+    for kind in case.walkers:
+        walkers = counted(kind.replicates, "walker")
+        bodies.append(f"{walkers} of R = {radii_text(kind.radii)} mm")
     if case.loose:
-        bodies.append(
-            f"{case.count - sum(len(kind.all_radii) for kind in case.walkers)} loose beads"
-        )
-    boundary = (
-        f"in a {case.boundary.shape}" if case.boundary.closed else f"on a {case.boundary.shape}"
-    )
-    return f"{', '.join(bodies)} {boundary} of {case.boundary.material}, {liquid_text(case)}; {conditions(case)}"
+        beads_of_walkers = sum(len(kind.all_radii) for kind in case.walkers)
+        bodies.append(f"{case.count - beads_of_walkers} loose beads")
+    boundary = case.boundary
+    preposition = "in" if boundary.closed else "on"
+    place = f"{preposition} a {boundary.shape} of {boundary.material}"
+    return f"{', '.join(bodies)} {place}, {liquid_text(case)}; {conditions(case)}"
 
 
 def conditions(case: Case) -> str:
-    """The drive of a case and, unless it is level, its tilt and where up is: ``…, plane tilted by 90°, right is up``.
+    """Describe the drive of a case and, unless it is level, its tilt and where up is.
 
-    Pictures have the drive axis to the right: what faces right goes up where that is the steepest way up.
+    An example is ``…, plane tilted by 90°, right is up``. Pictures have the drive axis to the
+    right: what faces right goes up where that is the steepest way up.
     """
-    parts = [case.excitation.described()]
-    if case.boundary.tilted:
-        up = (
-            "right is up"
-            if case.goes_uphill
-            else f"up is at {degrees(case.boundary.uphill):.4g}° from x toward y"
-        )
-        parts += [case.boundary.tilted, up]
-    return ", ".join(parts)
+    drive: str = case.excitation.described()
+    tilt = case.boundary.tilted
+    if not tilt:
+        return drive
+    if case.goes_uphill:
+        up = "right is up"
+    else:
+        up = f"up is at {degrees(case.boundary.uphill):.4g}° from x toward y"
+    return f"{drive}, {tilt}, {up}"
 
 
 def liquid_text(case: Case) -> str:

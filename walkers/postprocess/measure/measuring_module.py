@@ -1,10 +1,10 @@
-"""Interface of the modules that measure runs: `walking`, `threshold`, `meetings`, `piles`, `record_part`.
+"""Interface of the modules that measure runs.
 
-Each module measures one kind of experiment: it tells which cases it applies to, and computes tables
-and numbers from the motion of a run. A case may have several of them: a tray of walkers that is
-shaken by a record has `walking`, `meetings` and `record_part`. The modules are listed in
-`walkers.postprocess.measure.results.MODULES`. Reading of dumps and writing of results are not their
-task.
+They are `walking`, `threshold`, `meetings`, `piles` and `record_part`. Each module measures one
+kind of experiment: it tells to which cases it applies, and computes tables and numbers from the
+motion of a run. Several may apply to a case: `walking`, `meetings` and `record_part` measure a tray of
+walkers that is shaken by a record. The modules are listed in
+`walkers.postprocess.measure.results.MODULES`. They neither read dumps nor write results.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class MeasuringModule(Protocol):
     Attributes
     ----------
     NAME
-        Name of its numbers in `walkers.postprocess.measure.quantities.GROUPS`, and of its version in
-        ``result.json``.
+        Name of its numbers in `walkers.postprocess.measure.quantities.GROUPS`, and of its version
+        in ``result.json``.
     VERSION
         Version of its method: raise it if the module gives other numbers or tables for the same
         dumps, also where the change is in a function that it calls. Results that other modules
@@ -69,10 +69,11 @@ class MeasuringModule(Protocol):
         Parameters
         ----------
         motion
-            Motion of the beads of a run to whose case the module applies; the run may be unfinished.
+            Motion of the beads of a run to whose case the module applies; the run may be
+            unfinished.
 
         Returns
         -------
-        Measured
+        Measurement
             Tables, numbers in SI units, and reasons to doubt them.
         """

@@ -1,6 +1,6 @@
 """The part of a record that a run contains, and reasons to doubt what the record does.
 
-A record that does not repeat is run up to a whole number of cycles.
+It concerns records that do not repeat; they are run up to a whole number of cycles.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ VERSION = 2
 
 
 def applies(case: Case) -> bool:
-    """Whether the drive of a case is a record that does not repeat."""
+    """Tell whether the drive of a case is a record that does not repeat."""
     return case.excitation.ends
 
 
@@ -24,10 +24,20 @@ def derived(case: Case) -> dict[str, float]:
 
 
 def measure(motion: Motion) -> Measurement:
-    """The time for which the record was run, its share, and the doubts of the record."""
+    """Measure for how long the record was run.
+
+    Parameters
+    ----------
+    motion
+        Motion of a run whose drive is a record that does not repeat.
+
+    Returns
+    -------
+    Measurement
+        ``record_run`` (s), ``record_share``, and the reasons to doubt the record.
+    """
     drive = motion.case.excitation
-    run = max(float(motion.time[-1]), 0.0)
-    doubts = tuple(drive.record.doubts) if drive.record else ()
-    return Measurement(
-        {}, {"record_run": run, "record_share": min(run / drive.length, 1.0)}, doubts
-    )
+    seconds = max(float(motion.time[-1]), 0.0)
+    numbers = {"record_run": seconds, "record_share": min(seconds / drive.length, 1.0)}
+    warnings = tuple(drive.record.doubts) if drive.record else ()
+    return Measurement(tables={}, numbers=numbers, warnings=warnings)
