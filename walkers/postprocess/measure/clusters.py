@@ -489,7 +489,9 @@ def _gained(track: Track, time: FloatArray, height: FloatArray) -> tuple[FloatAr
     seconds = [0.0]
     for place, (before, now) in enumerate(pairwise(track.frames)):
         common = list(track.members[place] & track.members[place + 1])
-        rise = float((height[now, common] - height[before, common]).mean()) if common else 0.0
+        rise = 0.0
+        if common:
+            rise = float((height[now, common] - height[before, common]).mean())
         if now == before + 1:
             rises.append(rise)
             seconds.append(float(time[now] - time[before]))
@@ -554,7 +556,8 @@ def _with_time_and_height(columns: Columns, beads: PileBeads) -> Columns:
     """Replace the column ``frame`` by the time; add the class and the height of the beads."""
     frame = columns["frame"]
     bead = columns["bead"]
-    completed = {name: column for name, column in columns.items() if name != "frame"}
+    completed = dict(columns)
+    del completed["frame"]
     completed["time"] = beads.time[frame]
     completed["large"] = beads.large[bead]
     completed["height"] = beads.height[frame, bead]

@@ -95,15 +95,17 @@ class BinaryDump:
             if os.fstat(file.fileno()).st_size > 0:  # an empty file cannot be mapped
                 self._bytes = np.memmap(file, np.uint8, "r").data
         self._frames: list[_Frame] = []
+        steps = []
         start = 0
         try:
             while start < len(self._bytes):
                 frame = self._frame_at(start)
                 self._frames.append(frame)
+                steps.append(frame.step)
                 start = frame.end
         except struct.error:
             self.truncated = True
-        self.steps = np.array([frame.step for frame in self._frames], dtype=np.int64)
+        self.steps = np.array(steps, dtype=np.int64)
 
     def __len__(self) -> int:
         return len(self._frames)
@@ -239,8 +241,10 @@ def _local_frame(
     except ValueError as error:
         raise DumpError(f"{path}: no header of a frame, or a part of one") from error
     body = [file.readline() for _ in range(count)]
-    last_line = body[-1] if body else head[-1]
-    if not head[-1].endswith(b"\n") or not last_line.endswith(b"\n"):
+    is_cut = not head[-1].endswith(b"\n")
+    if body:
+        is_cut = is_cut or not body[-1].endswith(b"\n")
+    if is_cut:
         raise DumpError(f"{path}: ends within the frame of step {step}")
     try:
         values = np.fromstring(b"".join(body), dtype=np.float64, sep=" ")

@@ -170,11 +170,15 @@ def averages(group: Group) -> Averages:
     """
     run = group.case.run
     samples = settled_samples(run)
-    parts = _PARTS if group.motion.follows_cycles else 1
+    interval = np.diff(group.time)
+    if group.motion.follows_cycles:
+        parts = _PARTS
+        unit_work = np.zeros((len(interval), len(group.walkers)))
+    else:
+        parts = 1
+        unit_work = np.full((len(interval), len(group.walkers)), np.nan)
     ends_of_parts = np.linspace(0.0, 1.0, parts + 1).tolist()[1:]
     open_shares = []
-    interval = np.diff(group.time)
-    unit_work = np.full((len(interval), len(group.walkers)), np.nan if parts == 1 else 0.0)
     before = group
     for part, end_of_part in enumerate(ends_of_parts):
         after = replace(group, position=interpolated_positions(group, end_of_part))

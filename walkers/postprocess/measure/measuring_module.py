@@ -2,8 +2,8 @@
 
 They are `walking`, `threshold`, `meetings`, `piles` and `record_part`. Each module measures one
 kind of experiment: it tells to which cases it applies, and computes tables and numbers from the
-motion of a run. Several may apply to a case: `walking`, `meetings` and `record_part` measure a tray of
-walkers that is shaken by a record. The modules are listed in
+motion of a run. Several may apply to a case: `walking`, `meetings` and `record_part` measure a tray
+of walkers that is shaken by a record. The modules are listed in
 `walkers.postprocess.measure.results.MODULES`. They neither read dumps nor write results.
 """
 

@@ -48,9 +48,13 @@ def derived(case: Case) -> dict[str, float]:
     if boundary.closed:
         area = boundary.geometry.cross_section
     else:
-        spacing = max(kind.spacing for kind in case.walkers)
-        cell = spacing * (boundary.width or spacing)
-        area = cell * sum(kind.replicates for kind in case.walkers)
+        spacing = 0.0
+        walkers = 0
+        for kind in case.walkers:
+            spacing = max(spacing, kind.spacing)
+            walkers += kind.replicates
+        spacing_across = boundary.width or spacing  # in a channel, its whole width
+        area = spacing * spacing_across * walkers
     beads = pi * sum(radius**2 for radius in case.all_radii)
     return {"coverage": float(f"{beads / area:.3g}")}
 
@@ -168,9 +172,8 @@ def centres_and_headings(motion: Motion) -> tuple[FloatArray, FloatArray]:
     heading = np.zeros((len(motion.time), len(motion.walkers), 2))
     for number in range(len(motion.case.walkers)):
         group = motion.group(number)
-        walkers = [walker.walker for walker in group.walkers]
-        centre[:, walkers] = group.mass_centre[..., :2]
-        heading[:, walkers] = group.heading[..., :2]
+        centre[:, group.walker_numbers] = group.mass_centre[..., :2]
+        heading[:, group.walker_numbers] = group.heading[..., :2]
     return centre, heading
 
 
@@ -239,6 +242,12 @@ def collective(course: TrayCourse, meetings: int, axis: FloatArray) -> dict[str,
     final_heading = course.heading[begin:]
     final_velocity = (centre[-1] - centre[begin]) / (time[-1] - time[begin])
     slow = np.linalg.norm(final_velocity, axis=-1) < _SLOW * free_speed
+    speed_ratio = nan
+    if free_speed:
+        speed_ratio = joined_speed / free_speed
+    slow_share = nan
+    if isfinite(free_speed):
+        slow_share = float(slow.mean())
     walkers = course.size.shape[1]
     return {
         "meeting_rate": 2.0 * meetings / (walkers * course.duration),
@@ -249,8 +258,8 @@ def collective(course: TrayCourse, meetings: int, axis: FloatArray) -> dict[str,
         "polar_order": float(np.linalg.norm(final_heading.mean(axis=1), axis=-1).mean()),
         "free_speed": free_speed,
         "joined_speed": joined_speed,
-        "speed_ratio": joined_speed / free_speed if free_speed else nan,
-        "slow_share": float(slow.mean()) if isfinite(free_speed) else nan,
+        "speed_ratio": speed_ratio,
+        "slow_share": slow_share,
     }
 
 
@@ -260,4 +269,6 @@ def _mean_speed(speed: FloatArray, chosen: BoolArray) -> float:
     The speed has the shape (K - 1, W), the choice of walkers (K, W).
     """
     speeds = speed[chosen[:-1] & chosen[1:]]
-    return float(speeds.mean()) if speeds.size else nan
+    if speeds.size == 0:
+        return nan
+    return float(speeds.mean())

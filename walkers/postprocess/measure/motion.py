@@ -129,6 +129,9 @@ class Motion:
             The motion of these frames and beads. Beads are renumbered in this order. Walkers keep
             their numbers; those that lose a bead are left out.
         """
+        mean_spin = self.mean_spin
+        if mean_spin is not None:
+            mean_spin = mean_spin[frames]
         selected = replace(
             self,
             time=self.time[frames],
@@ -137,7 +140,7 @@ class Motion:
             spin=self.spin[frames],
             substrate=self.substrate[frames],
             frames=self.frames[frames],
-            mean_spin=None if self.mean_spin is None else self.mean_spin[frames],
+            mean_spin=mean_spin,
         )
         return selected if beads is None else selected._with_beads(beads)
 
@@ -149,6 +152,12 @@ class Motion:
             if new_number.keys() >= set(walker.beads):
                 renumbered = tuple(new_number[bead] for bead in walker.beads)
                 walkers.append(replace(walker, beads=renumbered))
+        mean_spin = self.mean_spin
+        if mean_spin is not None:
+            mean_spin = mean_spin[:, beads]
+        bead_numbers = beads
+        if self.bead_numbers is not None:
+            bead_numbers = self.bead_numbers[beads]
         return replace(
             self,
             position=self.position[:, beads],
@@ -156,8 +165,8 @@ class Motion:
             spin=self.spin[:, beads],
             radius=self.radius[beads],
             walkers=tuple(walkers),
-            mean_spin=None if self.mean_spin is None else self.mean_spin[:, beads],
-            bead_numbers=beads if self.bead_numbers is None else self.bead_numbers[beads],
+            mean_spin=mean_spin,
+            bead_numbers=bead_numbers,
         )
 
     def of_walkers(self, walkers: Collection[PlacedWalker]) -> Motion:
@@ -259,6 +268,16 @@ class Group:
     spin: FloatArray
 
     @property
+    def walker_numbers(self) -> IntArray:
+        """Numbers of the walkers in the run, shape (W,)."""
+        return np.array([walker.walker for walker in self.walkers])
+
+    @property
+    def facing(self) -> IntArray:
+        """Direction that the walkers face, 1 along the drive axis, −1 opposite, shape (W,)."""
+        return np.array([walker.facing for walker in self.walkers])
+
+    @property
     def radii(self) -> FloatArray:
         """Radii of the beads of each walker, m, shape (n,)."""
         return np.array(self.kind.radii)
@@ -332,9 +351,8 @@ class Group:
         front = np.array(self.kind.front)
         front_ahead, front_aside = front @ np.array(self.kind.design)
         arm = np.einsum("fwbx,b->fwx", self.position, front)
-        facing = np.array([walker.facing for walker in self.walkers])
-        ahead = facing * (arm @ self.drive_axis)
-        aside = facing * (arm @ self.across_axis)
+        ahead = self.facing * (arm @ self.drive_axis)
+        aside = self.facing * (arm @ self.across_axis)
         turned = np.arctan2(aside, ahead)
         turned_in_design = np.arctan2(front_aside, front_ahead)
         angle: FloatArray = np.unwrap(turned - turned_in_design, axis=0)
@@ -504,11 +522,13 @@ def _read_segments(case: Case, paths: Sequence[Path]) -> list[_Segment]:
     """
     segments: list[_Segment] = []
     for path in paths:
-        # The first frame of a segment repeats the last one of the segment before.
-        first_new_frame = 1 if segments else 0
+        first_new_frame = 0
+        end_of_previous = 0
+        if segments:
+            first_new_frame = 1  # the first frame repeats the last one of the segment before
+            end_of_previous = segments[-1].dump.steps[-1]
         segment = _open_segment(path, first_new_frame)
         dump = segment.dump
-        end_of_previous = segments[-1].dump.steps[-1] if segments else 0
         if segment.begin != end_of_previous:
             raise DumpError(f"{path}: the segment before it is missing")
         is_whole = len(dump) > 0 and not dump.truncated and dump.steps[-1] == segment.end
@@ -533,7 +553,9 @@ def _read_vectors(segments: Sequence[_Segment]) -> dict[str, FloatArray]:
     names = ["x", "vx", "omegax"]
     if MEAN_SPIN_COLUMNS[0] in layout.bead_columns:
         names.append(MEAN_SPIN_COLUMNS[0])
-    frames = sum(len(segment.new_frames) for segment in segments)
+    frames = 0
+    for segment in segments:
+        frames += len(segment.new_frames)
     vectors = {name: np.empty((frames, layout.atoms, 3)) for name in names}
     frame = 0
     for segment in segments:
@@ -551,15 +573,24 @@ def _joined(case: Case, segments: Sequence[_Segment]) -> Motion:
     run = case.run
     first = segments[0]
     last = segments[-1]
-    steps = np.concatenate([segment.dump.steps[segment.first_new_frame :] for segment in segments])
-    drive_steps = [segment.drive_from for segment in segments if segment.drive_from is not None]
-    # A drive that has not started yet starts in the frame after the last one.
-    drive_step = drive_steps[0] if drive_steps else steps[-1] + run.steps_per_sample
-    time = (steps - drive_step) * run.time_step
+    steps_of_segments = []
+    frames: list[tuple[Path, int]] = []
+    drive_from = None
+    for segment in segments:
+        steps_of_segments.append(segment.dump.steps[segment.first_new_frame :])
+        frames += [(segment.path, number) for number in segment.new_frames]
+        if drive_from is None:
+            drive_from = segment.drive_from
+    steps = np.concatenate(steps_of_segments)
+    if drive_from is None:
+        # A drive that has not started yet starts in the frame after the last one.
+        time = (steps - (steps[-1] + run.steps_per_sample)) * run.time_step
+    else:
+        time = (steps - drive_from) * run.time_step
 
     vectors = _read_vectors(segments)
     displacement, velocity = prescribed_motion(case.excitation, time)
-    if drive_steps and drive_step > 0:
+    if drive_from is not None and drive_from > 0:
         velocity[time == 0.0] = 0.0  # in the last frame at rest the walls do not move yet
     vectors["x"] -= displacement[:, None]
     vectors["vx"] -= velocity[:, None]
@@ -573,9 +604,6 @@ def _joined(case: Case, segments: Sequence[_Segment]) -> Motion:
     for walker in last.layout.walkers:
         beads_from_zero = tuple(bead - 1 for bead in walker.beads)
         walkers.append(replace(walker, beads=beads_from_zero))
-    frames = []
-    for segment in segments:
-        frames += [(segment.path, number) for number in segment.new_frames]
     radius_column = first.layout.bead_columns.index("radius")
     return Motion(
         case=completed_case,

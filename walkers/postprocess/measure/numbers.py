@@ -95,8 +95,12 @@ def headline(numbers: Mapping[str, Any]) -> str:
     if "velocity" in numbers:
         if not_all_upright(numbers):
             return "axial_velocity"
-        return "right_facing" if numbers.get("facings_differ") else "velocity"
-    return "climbs" if "climbs" in numbers else ""
+        if numbers.get("facings_differ"):
+            return "right_facing"
+        return "velocity"
+    if "climbs" in numbers:
+        return "climbs"
+    return ""
 
 
 def not_all_upright(numbers: Mapping[str, Any]) -> bool:

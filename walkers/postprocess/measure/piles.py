@@ -136,7 +136,9 @@ def _measure_frames(motion: Motion) -> _Frames:
         rows.append(_state_of(motion, bridges, bulk, present, floor))
         bulks.append(bulk)
         clusters_of_frames.append(present)
-    bed = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    bed: Columns = {}
+    for name in rows[0]:
+        bed[name] = np.array([row[name] for row in rows])
     return _Frames(bed, bulks, clusters_of_frames)
 
 
@@ -144,10 +146,13 @@ def _of_climbs(clusters: Columns) -> dict[str, Any]:
     """Numbers of all climbs in the table ``clusters``; NaN without climbs."""
     climbs = {name: column[clusters["climbed"]] for name, column in clusters.items()}
     speeds = climbs["speed"][np.isfinite(climbs["speed"])].tolist()
+    mean_speed = nan
+    if speeds:
+        mean_speed = sum(speeds) / len(speeds)
     return {
         "climbs": len(climbs["track"]),
         "onset": float(min(climbs["onset"], default=nan)),
-        "speed": sum(speeds) / len(speeds) if speeds else nan,
+        "speed": mean_speed,
         "highest": float(max(climbs["height"], default=nan)),
         "led_by_large": int(climbs["leader_large"].sum()),
     }
@@ -169,7 +174,9 @@ def _of_bed(motion: Motion, bed: Columns) -> dict[str, Any]:
         numbers[f"{name}_end"] = float(bed[name][-1])
     for name in ("contacts", "bridges"):
         numbers[f"{name}_at_rest"] = float(bed[name][rest])
-        numbers[f"{name}_shaken"] = float(np.mean(bed[name][second_half])) if end > 0.0 else nan
+        numbers[f"{name}_shaken"] = nan
+        if end > 0.0:
+            numbers[f"{name}_shaken"] = float(np.mean(bed[name][second_half]))
     return numbers
 
 
@@ -221,6 +228,9 @@ def _state_of(
     for cluster in held:
         highest = max(highest, float(position[list(cluster.members), 2].max()))
     pairs = len(bridges.beads)
+    mean_force = 0.0
+    if pairs:
+        mean_force = float(bridges.force[:pairs].mean())
     touching = int((bridges.gap[:pairs] <= 0.0).sum())
     return {
         "time": float(motion.time[frame]),
@@ -234,7 +244,7 @@ def _state_of(
         "bridges": 2.0 * pairs / len(position),
         "touching": touching,
         "opened": pairs - touching,
-        "mean_force": float(bridges.force[:pairs].mean()) if pairs else 0.0,
+        "mean_force": mean_force,
         "bulk": int(bulk.sum()),
         "at_wall": int(at_wall.sum()),
         "large_at_wall": int((at_wall & large).sum()),

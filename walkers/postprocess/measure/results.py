@@ -149,23 +149,24 @@ def measure(directory: Path) -> None:
     check_unchanged(directory, files_of_segments(directory))
     motion = read_motion(directory)
     case = motion.case
-    modules = modules_of(case)
     numbers = derived(case)
     numbers["goes_uphill"] = case.goes_uphill
     numbers["truncated"] = motion.truncated
     tables: dict[str, Columns] = {}
+    versions: dict[str, int] = {}
     segment = read_json(segment_directories(directory)[-1] / SEGMENT_NAME)
     notes = segment.get("by_hand") or []
     warnings = list(notes)
-    for module in modules:
+    for module in modules_of(case):
         measurement = module.measure(motion)
         tables |= measurement.tables
         numbers |= measurement.numbers
         warnings += measurement.warnings
+        versions[module.NAME] = module.VERSION
     warnings += _general_warnings(motion)
     contents = {
         "version": VERSION,
-        "modules": {module.NAME: module.VERSION for module in modules},
+        "modules": versions,
         "case": case.name,
         "drive": conditions(case),
         "rests_on": uncertain_values(case.origins),
@@ -384,9 +385,13 @@ def text(results: Results, *, cached: bool = False) -> str:
 
 def _lines_of_numbers(listed: Sequence[Row]) -> list[str]:
     """Numbers as lines with aligned labels, values, units and errors."""
-    label_width = max((len(row.label) for row in listed), default=0)
-    value_width = max((len(row.text) for row in listed), default=0)
-    unit_width = max((len(row.unit) for row in listed), default=0)
+    label_width = 0
+    value_width = 0
+    unit_width = 0
+    for row in listed:
+        label_width = max(label_width, len(row.label))
+        value_width = max(value_width, len(row.text))
+        unit_width = max(unit_width, len(row.unit))
     lines = []
     for row in listed:
         value = f"{row.text:>{value_width}} {row.unit:{unit_width}}"

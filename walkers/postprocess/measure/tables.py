@@ -66,12 +66,16 @@ def write_table(directory: Path, name: str, columns: Columns) -> None:
 
     arrays = []
     fields = []
+    reals = []
+    others = []
     for column in _order_of(name, columns):
         array = _arrow(columns[column])
         arrays.append(array)
         fields.append(pa.field(column, array.type, metadata=_metadata(name, column)))
-    reals = [field.name for field in fields if pa.types.is_floating(field.type)]
-    others = [field.name for field in fields if field.name not in reals]
+        if pa.types.is_floating(array.type):
+            reals.append(column)
+        else:
+            others.append(column)
     with replacing(directory / f"{name}.parquet") as new:
         pq.write_table(
             pa.Table.from_arrays(arrays, schema=pa.schema(fields)),

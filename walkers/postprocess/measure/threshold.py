@@ -65,10 +65,11 @@ def measure(motion: Motion) -> Measurement:
         are no numbers: the mean velocity stands, with a warning.
     """
     drive = motion.case.excitation
-    walked = [distance_walked(group) for group in motion.groups]
-    time_of_cycles, _ = walked[0]
-    times = time_of_cycles[::WINDOW_CYCLES]
-    distances = [distance[::WINDOW_CYCLES] for _, distance in walked]
+    distances = []
+    for group in motion.groups:
+        time_of_cycles, distance = distance_walked(group)
+        times = time_of_cycles[::WINDOW_CYCLES]  # they are the same for all kinds
+        distances.append(distance[::WINDOW_CYCLES])
     velocity = np.diff(np.concatenate(distances, axis=1), axis=0) / np.diff(times)[:, None]
     peaks = drive.local_amplitude(times)
     tables = {"ramp": _ramp_table(motion, times, peaks, velocity)}
@@ -102,9 +103,7 @@ def _ramp_table(
     """
     middle_times = (times[1:] + times[:-1]) / 2.0
     middle_peaks = (peaks[1:] + peaks[:-1]) / 2.0
-    numbers: list[int] = []
-    for group in motion.groups:
-        numbers += [walker.walker for walker in group.walkers]
+    numbers = np.concatenate([group.walker_numbers for group in motion.groups])
     return {
         "walker": np.repeat(numbers, len(middle_times)),
         "time": np.tile(middle_times, len(numbers)),

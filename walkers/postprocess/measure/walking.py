@@ -94,7 +94,7 @@ def measure(motion: Motion) -> Measurement:
     case = motion.case
     groups = motion.groups
     tables_of_kinds = [tables_of(group) for group in groups]
-    tables = {}
+    tables: dict[str, Columns] = {}
     for name in tables_of_kinds[0]:
         tables[name] = _stacked([tables_of_kind[name] for tables_of_kind in tables_of_kinds])
     walkers = tables["walkers"]
@@ -198,7 +198,9 @@ def _turning_warning(groups: Sequence[Group], walkers: Columns) -> str | None:
 
 def _stacked(parts: Sequence[Columns]) -> Columns:
     """Concatenate tables of several kinds of walkers; columns that a kind does not have are NaN."""
-    names = dict.fromkeys(name for part in parts for name in part)
+    names: dict[str, None] = {}  # in their order
+    for part in parts:
+        names |= dict.fromkeys(part)
     stacked = {}
     for name in names:
         columns = []
@@ -253,17 +255,16 @@ def _trajectory_table(group: Group) -> Columns:
 
 def _walkers_table(group: Group, averages: gait.Averages) -> Columns:
     """Table ``walkers``: the start of each walker, and means over the cycles after settling."""
-    placed = group.walkers
     beads = len(group.radii)
     samples = gait.settled_samples(group.case.run)
     loads_of_pairs = contact_loads(group.case, group.kind)[beads:]
     rupture_distance = np.array([load.rupture for load in loads_of_pairs])
     separated = (group.gap[samples, :, beads:] > rupture_distance).any(axis=-1)
     columns = {
-        "walker": np.array([walker.walker for walker in placed]),
-        "make": np.array([walker.kind for walker in placed]),
-        "facing": np.array([walker.facing for walker in placed]),
-        "start_angle": np.array([walker.start_angle for walker in placed]),
+        "walker": group.walker_numbers,
+        "make": np.array([walker.kind for walker in group.walkers]),
+        "facing": group.facing,
+        "start_angle": np.array([walker.start_angle for walker in group.walkers]),
     }
     columns |= gait.measure_walk(group)
     columns |= {
@@ -302,8 +303,7 @@ def _one_walker_after_another(group: Group, columns: Columns) -> Columns:
     """Flatten columns of shape (F,) or (F, W) to F rows for each walker; add ``walker``."""
     frames = len(next(iter(columns.values())))
     shape = (frames, len(group.walkers))
-    numbers = [walker.walker for walker in group.walkers]
-    rows = {"walker": np.broadcast_to(numbers, shape).T.reshape(-1)}
+    rows = {"walker": np.broadcast_to(group.walker_numbers, shape).T.reshape(-1)}
     for name, values in columns.items():
         wide = values if values.ndim > 1 else np.broadcast_to(values[:, None], shape)
         rows[name] = wide.T.reshape(-1)
@@ -362,12 +362,16 @@ def _contact_numbers(motion: Motion) -> dict[tuple[int, int], int]:
 def _mean(values: FloatArray) -> float:
     """Mean of the finite values; NaN if there are none."""
     finite = values[np.isfinite(values)]
-    return float(finite.mean()) if len(finite) else nan
+    if len(finite) == 0:
+        return nan
+    return float(finite.mean())
 
 
 def _scatter(values: FloatArray) -> float:
     """Standard deviation over copies; NaN for a single one."""
-    return float(np.std(values, ddof=1)) if len(values) > 1 else nan
+    if len(values) <= 1:
+        return nan
+    return float(np.std(values, ddof=1))
 
 
 def _velocities(walkers: Columns, case: Case) -> dict[str, Any]:
@@ -511,6 +515,9 @@ def walkers_met(groups: Sequence[Group]) -> bool:
         The walkers of each kind. Their centres of mass are compared once per cycle.
     """
     frames_per_cycle = groups[0].case.run.samples_per_cycle
-    centres = [group.mass_centre[::frames_per_cycle, :, :2] for group in groups]
-    longest = max(group.kind.length for group in groups)
+    centres = []
+    longest = 0.0
+    for group in groups:
+        centres.append(group.mass_centre[::frames_per_cycle, :, :2])
+        longest = max(longest, group.kind.length)
     return came_near(np.concatenate(centres, axis=1), NEAR * longest)
