@@ -46,7 +46,7 @@ ALLOWED = {
     # A label with a place for the number of a bead, such as "rotation of bead *".
     (
         "walkers/postprocess/measure/quantities.py",
-        "quantity.label.replace('*', number[1] if number else '*')",
+        "label.replace('*', number[1] if number else '*')",
     ),
 }
 """What takes no decision."""

@@ -662,11 +662,11 @@ def _assembly_in_frame(
 
 
 class _Event(NamedTuple):
-    """An event of a cluster: its frame and track, the other track (-1 for none), its name."""
+    """An event of a cluster: its frame and track, a second track (-1 for none), its name."""
 
     frame: int
     track: int
-    other: int
+    second_track: int
     event: str
 
 

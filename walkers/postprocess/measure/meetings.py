@@ -85,8 +85,8 @@ def measure(motion: Motion) -> Measurement:
         frame = frames[number]
         for event, pairs in (("merged", state.joined - before), ("parted", before - state.joined)):
             rows += [
-                (frame, event, walker, other, size[number, walker])
-                for walker, other in sorted(pairs)
+                (frame, event, walker, partner, size[number, walker])
+                for walker, partner in sorted(pairs)
             ]
         before = state.joined
     types = {"frame": int, "event": str, "walker": int, "other": int, "size": int}

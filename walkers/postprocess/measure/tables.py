@@ -67,7 +67,7 @@ def write_table(directory: Path, name: str, columns: Columns) -> None:
     arrays = []
     fields = []
     reals = []
-    others = []
+    not_reals = []
     for column in _order_of(name, columns):
         array = _arrow(columns[column])
         arrays.append(array)
@@ -75,13 +75,13 @@ def write_table(directory: Path, name: str, columns: Columns) -> None:
         if pa.types.is_floating(array.type):
             reals.append(column)
         else:
-            others.append(column)
+            not_reals.append(column)
     with replacing(directory / f"{name}.parquet") as new:
         pq.write_table(
             pa.Table.from_arrays(arrays, schema=pa.schema(fields)),
             new,
             compression="zstd",
-            use_dictionary=others,
+            use_dictionary=not_reals,
             use_byte_stream_split=reals,
         )
 

@@ -162,8 +162,8 @@ def fixed_values_text(values: Sequence[Origin]) -> str:
     if liquid:
         names = [f" ({value.text})" for value in values if value.key == "liquid.name"]
         liquid += "".join(names)
-    other = _key_and_value(values, unmeasured())
-    listed = ", ".join(text for text in (liquid, other) if text)
+    unmeasured_values = _key_and_value(values, unmeasured())
+    listed = ", ".join(text for text in (liquid, unmeasured_values) if text)
     rest = "all other values; to vary one, add its range in [uncertain]"
     return f"{listed} and {rest}" if listed else rest
 
