@@ -171,12 +171,13 @@ def averages(group: Group) -> Averages:
     run = group.case.run
     samples = settled_samples(run)
     interval = np.diff(group.time)
+    # Work on a unit of mass in each interval between frames, J/kg, summed over the parts.
     if group.motion.follows_cycles:
         parts = _PARTS
-        unit_work = np.zeros((len(interval), len(group.walkers)))
+        specific_work = np.zeros((len(interval), len(group.walkers)))
     else:
         parts = 1
-        unit_work = np.full((len(interval), len(group.walkers)), np.nan)
+        specific_work = np.full((len(interval), len(group.walkers)), np.nan)
     ends_of_parts = np.linspace(0.0, 1.0, parts + 1).tolist()[1:]
     open_shares = []
     before = group
@@ -186,14 +187,14 @@ def averages(group: Group) -> Averages:
         time = group.time[:-1] + (part + 0.5) / parts * interval
         displacement = after.mass_centre - before.mass_centre[: len(interval)]
         for direction, (_, _, acceleration) in group.case.excitation.motions(time):
-            unit_work += -acceleration[:, None] * (displacement @ np.array(direction))
+            specific_work += -acceleration[:, None] * (displacement @ np.array(direction))
         before = after
     mean = gait(group.motion.averaged.group(group.walkers[0].kind))
     return Averages(
         rotation=mean.rotation[samples].mean(axis=0),
         sliding=mean.sliding[samples].mean(axis=0),
         open=np.mean(open_shares, axis=0),
-        work=mass_of(group) * _sums_over_cycles(unit_work, run.samples_per_cycle),
+        work=mass_of(group) * _sums_over_cycles(specific_work, run.samples_per_cycle),
     )
 
 
