@@ -233,7 +233,7 @@ def _compared_numbers(first: Results, second: Results) -> list[_ComparedNumber]:
 
 def _not_compared(first: Results, second: Results) -> set[str]:
     """Names of numbers that say nothing about the difference of two results."""
-    left_out = {*ASIDE, "coverage"}
+    left_out = {*NOT_SHOWN_ALONE, "coverage"}
     main_numbers = {headline(first), headline(second)}
     if "axial_velocity" in main_numbers:
         left_out |= {*_VELOCITIES}
@@ -242,7 +242,7 @@ def _not_compared(first: Results, second: Results) -> set[str]:
     for results in (first, second):
         if results.get("facings_differ") and not results.get("goes_uphill"):
             left_out.add("velocity")
-        left_out |= saying_nothing(results)
+        left_out |= meaningless_numbers(results)
     return left_out
 
 
@@ -360,7 +360,7 @@ def _printed_values(number: _ComparedNumber, runs: Sequence[_FinishedRun]) -> li
     If only one of them is a mean over the walkers that face up, the value says so.
     """
     unit, factor = unit_shown(number.unit)
-    facing_up = [is_of_up(declared(number.quantity), run.results) for run in runs]
+    facing_up = [leaves_out_facing_down(declared(number.quantity), run.results) for run in runs]
     texts = []
     for value, is_facing_up in zip((number.first, number.second), facing_up, strict=True):
         text = rounded(factor * value, unit)

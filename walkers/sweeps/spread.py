@@ -278,7 +278,7 @@ def spread_in(
         names = [main_columns(whole)[0]]
         counts = _counts_of_outcomes(finished, whole, names[0])
     else:
-        names = [name for name in MAIN if name in table]
+        names = [name for name in MAIN_NUMBERS if name in table]
         counts = {}
     varied = _uncertain_values(case)
     keys = [value.key for value in varied]

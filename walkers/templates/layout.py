@@ -67,7 +67,7 @@ PAIR_BRIDGE_COLUMNS = ("id1", "id2", "fx", "fy", "fz", "overlap")
 WALL_BRIDGE_COLUMNS = ("wall", "id", "fx", "fy", "fz", "overlap")
 """Columns of the dump of bridges to walls: number of the wall, force (N) on bead ``id``."""
 
-_KIND_NAMES = AliasChoices("kind", "kind")
+_KIND_NAMES = AliasChoices("kind", "make")
 """Names of the field ``kind`` of `PlacedWalker` in Python, and in ``layout.json``."""
 
 
@@ -92,7 +92,7 @@ class PlacedWalker:
     """
 
     walker: int
-    kind: Annotated[int, Field(validation_alias=_KIND_NAMES, serialization_alias="kind")]
+    kind: Annotated[int, Field(validation_alias=_KIND_NAMES, serialization_alias="make")]
     beads: tuple[int, ...]
     facing: int
     start_angle: float
@@ -179,4 +179,5 @@ class DeckLayout:
 
     def as_dict(self) -> dict[str, Any]:
         """The layout in plain JSON types."""
-        return asdict(self)
+        written: dict[str, Any] = TypeAdapter(DeckLayout).dump_python(self, by_alias=True)
+        return written

@@ -16,7 +16,7 @@ import numpy as np
 from walkers.arrays import BoolArray, FloatArray
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.tables.case import Case
-from walkers.postprocess.measure.gait import GROWS
+from walkers.postprocess.measure.gait import LEAST_GROWTH_RATE
 from walkers.postprocess.measure.results import json_numbers
 from walkers.theory.mathieu import LARGEST_STABLE_V, alignment, time_to_turn, turning_rate
 from walkers.theory.motion import PredictedMotion, Walker, predict_motion
@@ -271,7 +271,7 @@ def alignment_of(case: Case) -> dict[str, Any]:
     if drive.peak_acceleration > 0.0:
         rate = turning_rate(case)
     if rate is not None:
-        stands = rate <= GROWS
+        stands = rate <= LEAST_GROWTH_RATE
         if not stands and mathieu.u:
             turns_over_after = time_to_turn(rate)
     return {
