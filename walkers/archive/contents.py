@@ -1,5 +1,4 @@
-"""Contents of an archive: the files of a run or a sweep, and what repeats runs with the engine
-alone.
+"""Contents of an archive: files of a run or a sweep, and what repeats it.
 
 The zip file is written in `walkers.archive.writing`.
 """

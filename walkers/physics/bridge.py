@@ -1,5 +1,4 @@
-"""Interface of a bridge law: capillary force and resistances between two surfaces as functions of
-their gap.
+"""Interface of a bridge law: capillary force and resistances as functions of the gap.
 
 The surfaces 1 and 2 are two spheres, or a sphere and a plane. The unit vector n points from 2 to 1,
 h is the gap, l1 and l2 are the distances of the centres from the middle of the contact. Three
@@ -82,8 +81,9 @@ class Surfaces:
     def between(
         cls, radius: float, other_radius: float, liquid: BridgeLiquid, roughness: Roughness
     ) -> Surfaces:
-        """The surfaces of a bead and of another bead or a plane, whose bridge has the volume that
-        the liquid gives it.
+        """The surfaces of a bead and of another bead or a plane.
+
+        Their bridge has the volume that the liquid gives it.
 
         Parameters
         ----------
@@ -114,8 +114,7 @@ class Surfaces:
 
     @property
     def films(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """What each surface gives to a bridge if its film is full, and the volume of each full
-        film, m³.
+        """What each surface gives to a bridge if its film is full, and the full film, m³.
 
         A wall gives nothing, and its film is infinite.
         """
@@ -249,8 +248,9 @@ def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
 
 
 def _checked(values: object, name: str, gaps: FloatArray) -> FloatArray:
-    """Values that a law gives at gaps, shape (n,); raises `UnusableLawError` if they are not finite
-    real numbers.
+    """Values that a law gives at n gaps, shape (n,).
+
+    Raises `UnusableLawError` if they are not finite real numbers.
     """
     numbers = np.asarray(values)
     if numbers.dtype.kind not in "fiu" or numbers.shape not in ((), gaps.shape):

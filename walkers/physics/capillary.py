@@ -60,8 +60,9 @@ class BridgeLiquid:
 
 
 def derjaguin_radius(radius_1: float, radius_2: float) -> float:
-    """Derjaguin radius 2 R1 R2 / (R1 + R2): radius of equal spheres with the same gap profile;
-    plane: infinity.
+    """Derjaguin radius 2 R1 R2 / (R1 + R2).
+
+    It is the radius of equal spheres with the same gap profile; a plane has an infinite radius.
     """
     return 2.0 / (1.0 / radius_1 + 1.0 / radius_2)
 
@@ -99,8 +100,9 @@ def bridge_volume(radius: float, other_radius: float, liquid: BridgeLiquid) -> f
 def _volume_by_suction(
     radius: float, other_radius: float, contact_angle: float, meniscus_radius: float
 ) -> float:
-    """Volume (m³) of a bridge between touching surfaces with the suction γ/``meniscus_radius``,
-    from the cache.
+    """Volume of a bridge between touching surfaces with a given suction, m³, from the cache.
+
+    The suction is γ/``meniscus_radius``.
     """
     bridge = (radius, other_radius, contact_angle, meniscus_radius)
 
@@ -123,15 +125,17 @@ def solver() -> bytes:
 
 
 def cavitation_gap(liquid: BridgeLiquid) -> float:
-    """Gap 2γ cos θ/p in which the suction of a meniscus is the pressure p of the air, m
-    (`walkers.physics.reynolds`).
+    """Gap 2γ cos θ/p in which the suction of a meniscus is the pressure p of the air, m.
+
+    `walkers.physics.reynolds` uses it.
     """
     return 2.0 * liquid.surface_tension * float(cosine(liquid.contact_angle)) / _AIR_PRESSURE
 
 
 def largest_normal(reduced_radius: float, roughness: float, liquid: BridgeLiquid) -> float:
-    """Upper bound of a bridge's normal resistance N, for much liquid between touching surfaces, N
-    s/m.
+    """Upper bound of the normal resistance N of a bridge, N s/m.
+
+    It holds for much liquid between touching surfaces.
 
     Parameters
     ----------

@@ -109,8 +109,9 @@ class ForceCurve(NamedTuple):
 
 @dataclass(frozen=True)
 class _Trigonometry:
-    """Trigonometric functions of angles x, from those of x/2 alone; all arrays have the shape of
-    the angles.
+    """Trigonometric functions of angles x, from those of x/2 alone.
+
+    All arrays have the shape of the angles.
     """
 
     sines: FloatArray
@@ -168,8 +169,9 @@ def _sinc_slope(x: FloatArray, cosines: FloatArray, sincs: FloatArray) -> FloatA
 
 @dataclass(frozen=True)
 class _Solids:
-    """Both solids at their wetting lines for n bridges; each array has the shape (n, 2), a column
-    for a solid.
+    """Both solids at their wetting lines for n bridges.
+
+    Each array has the shape (n, 2), a column for a solid.
 
     ``…_by_arc`` are derivatives with respect to the arc of the same solid.
     """
@@ -220,8 +222,9 @@ class _Profile:
 
 @dataclass(frozen=True)
 class _Family:
-    """Bridges of volume 1 between two solids: spheres of curvature k (0: a plane) with contact
-    angles θ.
+    """Bridges of volume 1 between two solids.
+
+    The solids are spheres of curvature k (0: a plane) with contact angles θ.
 
     A bridge is x = (arc 1, arc 2, p, length of the profile, gap), with the arcs from the apexes of
     the solids.
@@ -260,8 +263,9 @@ class _Family:
 
     @cached_property
     def contact(self) -> tuple[FloatArray, FloatArray]:
-        """Sine and cosine of the angle of the profile at wetting lines on flat solids, each of
-        shape (2,).
+        """Sine and cosine of the angle of the profile at wetting lines on flat solids.
+
+        Each has the shape (2,).
         """
         first, second = self.contact_angles
         return sine_and_cosine([pi - first, second])
@@ -382,8 +386,9 @@ class _Family:
         return pi * (2.0 * solids.r_sin_phi - x[:, 2:3] * solids.radii**2)[:, 0]
 
     def solve(self, x: FloatArray, row: FloatArray, values: FloatArray) -> FloatArray:
-        """Solve for n bridges with row · x = value by Newton's method from n bridges x, both of
-        shape (n, 5).
+        """Solve for n bridges with row · x = value by Newton's method.
+
+        The method starts from n bridges x, shape (n, 5), as that of the solutions.
 
         Bridges are NaN where the method fails.
         """
@@ -424,8 +429,9 @@ class _Family:
 
 
 def _caps(solids: _Solids) -> tuple[FloatArray, FloatArray]:
-    """Volumes of the caps of the solids below the wetting lines, and their slopes, both of shape
-    (n, 2).
+    """Volumes of the caps of the solids below the wetting lines, and their slopes.
+
+    Both have the shape (n, 2).
     """
     radii, cap_heights = solids.radii, solids.cap_heights
     volumes = pi / 6.0 * cap_heights * (3.0 * radii**2 + cap_heights**2)
@@ -444,8 +450,9 @@ _GAP = np.array([0.0, 0.0, 0.0, 0.0, 1.0])
 
 
 def _toroid(family: _Family) -> FloatArray:
-    """An approximate bridge at contact: a circular profile between wetting lines of one radius, of
-    volume 1.
+    """An approximate bridge of volume 1 at contact.
+
+    Its profile is an arc of a circle between wetting lines of one radius.
     """
     # π k b⁴ / 4 = 1, between surfaces whose distance grows as k b² / 2.
     arc = np.full(2, sqrt(2.0 / sqrt(pi * sum(family.curvatures))))
@@ -481,8 +488,9 @@ def _flatter(family: _Family, share: float) -> _Family:
 
 
 def _touching(family: _Family) -> FloatArray:
-    """The bridge at contact, continued from flatter solids, for which `_toroid` is a good
-    approximation.
+    """The bridge at contact.
+
+    It is continued from flatter solids, for which `_toroid` is a good approximation.
     """
     for first_share in _SHARES:
         share = first_share
@@ -539,8 +547,9 @@ def _onward(
 def _turning_point(
     family: _Family, x: FloatArray, tangent: FloatArray, step: float, scale: FloatArray
 ) -> tuple[tuple[FloatArray, FloatArray], float]:
-    """The bridge at the largest gap, which is less than a step along the family, and the step to
-    it.
+    """The bridge at the largest gap, and the step to it.
+
+    It is less than a given step along the family.
     """
 
     def opening(part: float) -> float:
@@ -641,8 +650,9 @@ def _stable(family: _Family, gaps: FloatArray) -> FloatArray:
 
 
 def _arc_at_gap(cubic: list[float], start: float, end: float, gap: float) -> float:
-    """Arc of the family at which an interpolated gap, a polynomial of degree 3 from ``start`` on,
-    has a value.
+    """Arc of the family at which an interpolated gap has a value.
+
+    The gap is a polynomial of degree 3 from ``start`` on.
     """
 
     def difference(arc: float) -> float:
@@ -682,8 +692,9 @@ def _across(
 def rupture_distance(
     radius_1: float, radius_2: float, volume: float, contact_angle: float | tuple[float, float]
 ) -> float:
-    """Largest gap at which a bridge of this volume exists; parameters and errors as for
-    `force_curve`.
+    """Largest gap at which a bridge of a volume exists.
+
+    Parameters and errors are as for `force_curve`.
     """
     family = _family_of((radius_1, radius_2), volume, contact_angle)
     return cube_root(volume) * _largest_gap(family)
@@ -698,8 +709,7 @@ def _largest_gap(family: _Family) -> float:
 def volume_at_contact(
     radius_1: float, radius_2: float, contact_angle: float, meniscus_radius: float
 ) -> float:
-    """Volume of a bridge between touching solids whose pressure is that of the air minus
-    γ/``meniscus_radius``.
+    """Volume of a bridge between touching solids by its suction, γ/``meniscus_radius``.
 
     Parameters
     ----------

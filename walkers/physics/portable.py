@@ -149,8 +149,9 @@ def exponential(x: npt.ArrayLike) -> FloatArray:
 
 
 def power(x: npt.ArrayLike, exponent: float) -> FloatArray:
-    """Numbers x ≥ 0 to a positive power, or positive ones to any; relative error 1e-16 (1 + 2
-    |exponent ln x|).
+    """Numbers x ≥ 0 to a positive power, or positive ones to any.
+
+    The relative error is 1e-16 (1 + 2 |exponent ln x|).
     """
     given = np.asarray(x, np.float64)
     zero = given == 0.0
@@ -207,8 +208,9 @@ def gauss_legendre(count: int) -> tuple[FloatArray, FloatArray]:
 
 
 def chebyshev_coefficients(values: FloatArray) -> FloatArray:
-    """Coefficients of the polynomial through values at `chebyshev_nodes`, as of
-    `numpy.polynomial.Chebyshev`.
+    """Coefficients of the polynomial through values at `chebyshev_nodes`.
+
+    They are those of `numpy.polynomial.Chebyshev`.
     """
     count = len(values)
     degrees = np.arange(count)[:, None]

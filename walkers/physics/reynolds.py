@@ -1,5 +1,6 @@
-"""Resistances of a bridge from the Reynolds equation in the wetted disc, with ambient pressure at
-its edge.
+"""Resistances of a bridge from the Reynolds equation in the wetted disc.
+
+The pressure at the edge of the disc is that of the air.
 
 Between surfaces 1 and 2 (spheres of radii R1 ≤ R2, or a sphere and a plane;
 `walkers.physics.bridge` has the signs and the velocities w, s, q) the gap is H = h + r²/2R*. With κ
@@ -78,8 +79,9 @@ _THIN = 1e-5
 
 
 def curve(surfaces: Surfaces, pull: Callable[[FloatArray], FloatArray], rupture: float) -> Curve:
-    """The curve of a law with the resistances of the Reynolds equation; its bridge forms on
-    contact.
+    """The curve of a law with the resistances of the Reynolds equation.
+
+    The bridge forms on contact.
 
     Parameters
     ----------
@@ -127,8 +129,9 @@ def resistances(
 
 
 def _tilted(y: FloatArray) -> FloatArray:
-    """J(y) = -∫ f x² dx from 0 to √y, for x⁻¹ (x (1 + x²)³ f')' - (1 + x²)³ f/x² = x, f = 0 at both
-    ends.
+    """J(y), the negative integral of f x² from 0 to √y.
+
+    f solves x⁻¹ (x (1 + x²)³ f')' - (1 + x²)³ f/x² = x and is zero at both ends.
 
     With the particular solution and the homogeneous one, of logarithmic slope L = d ln f/d ln x at
     the edge,
@@ -144,8 +147,9 @@ def _tilted(y: FloatArray) -> FloatArray:
 
 
 def _logarithmic_slope(y: FloatArray) -> FloatArray:
-    """L = d ln f/d ln x of the homogeneous solution f = x ₂F₁(a, 4 - a; 2; -y), a = 2 - √10/2, at y
-    = x².
+    """L = d ln f/d ln x of the homogeneous solution f at y = x².
+
+    f = x ₂F₁(a, 4 - a; 2; -y) with a = 2 - √10/2.
 
     By Pfaff's transformation ₂F₁ is (1 + y)^-a G(w) with G = ₂F₁(a, a - 2; 2; w) and w = y/(1 + y),
     so that L = 1 - 2 a w + 2 w (1 - w) G'/G. G is a power series in w up to w = 1/2, and two series

@@ -159,8 +159,7 @@ def _normal_resistance(reduced_radius: float, roughness: float, liquid: BridgeLi
 def fit_into_cycle(
     largest_time_step: float, frequency: float, samples_per_cycle: int
 ) -> tuple[float, int]:
-    """Largest time step that divides the cycle of the drive and each sampling interval into whole
-    steps.
+    """Largest time step that divides the cycle and each sampling interval into whole steps.
 
     Samples that drift through the phase (every 312 of 6250 steps) change a mean velocity by 3 %.
 

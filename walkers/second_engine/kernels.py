@@ -254,8 +254,9 @@ def add_scaled(a: Vector, scale: float, b: Vector) -> Vector:
 def bridge_forces(
     bridges: BridgeSplines, bridge: int, gap: float
 ) -> tuple[float, float, float, float, float]:
-    """Capillary force and resistances of a bridge at a gap (m); those of overlaps are as at
-    contact.
+    """Capillary force and resistances of a bridge at a gap (m).
+
+    Those of overlaps are as at contact.
 
     Returns
     -------

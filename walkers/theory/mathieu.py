@@ -81,8 +81,9 @@ class Alignment:
 
     @property
     def growth(self) -> float:
-        """Largest growth rate (Floquet exponent) of small angles per unit of ϑ; multiply by πf for
-        1/s.
+        """Largest growth rate (Floquet exponent) of small angles per unit of ϑ.
+
+        Multiplied by πf, it is in 1/s.
         """
         theta = pi * (np.arange(_MATHIEU_STEPS) + 0.5) / _MATHIEU_STEPS
         slopes = np.zeros((_MATHIEU_STEPS, 2, 2))
@@ -133,8 +134,9 @@ def time_to_turn(rate: float) -> float:
 
 
 def turning_rate(case: Case) -> float | None:
-    """Growth rate of small angles to the axis, 1/s; negative for decay, None if the motion is not
-    periodic.
+    """Growth rate of small angles to the axis, 1/s.
+
+    It is negative for decay, and None if the motion is not periodic.
 
     Each contact resists sideways sliding by c = μF/|v|, because friction is opposite to the
     direction of sliding, which is almost along the axis; its bridge resists as along the axis.
@@ -163,8 +165,9 @@ def turning_rate(case: Case) -> float | None:
 
 @dataclass(frozen=True)
 class _AxialMotion:
-    """The periodic motion along the axis in the middle of each step of a cycle, and the forces that
-    go with it.
+    """The periodic motion along the axis, and the forces that go with it.
+
+    Values are those in the middle of each step of a cycle.
     """
 
     sliding: FloatArray

@@ -50,8 +50,9 @@ CYCLES = 60
 
 @dataclass(frozen=True)
 class Walker:
-    """N dimers. Contacts 1 and 2 are those of the beads with the substrate, 3 is that between the
-    beads.
+    """N dimers.
+
+    Contacts 1 and 2 are those of the beads with the substrate, 3 is that between the beads.
     """
 
     radii: FloatArray
@@ -218,8 +219,9 @@ def predict_motion(  # noqa: PLR0913
 
 
 def _tables(walker: Walker, steps_per_second: FloatArray) -> FloatArray:
-    """The tables of `walkers.theory.stepping.integrate` for N numbers of steps per second, shape
-    (N, 3, 13, 3).
+    """The tables of `walkers.theory.stepping.integrate`, shape (N, 3, 13, 3).
+
+    Numbers of steps per second have the shape (N,).
 
     Bridges slow the sliding velocities by A v with A = G (S + C H + Hᵀ(C + Q H)), and press
     contacts by B v with B = D (S + C H). In h seconds, velocities v0 coast to P v0 with P = (1 + h

@@ -1,6 +1,4 @@
-"""Where the measurements of the paper lie: to which cases its fit applies, and which cases are
-beyond its range.
-"""
+"""To which cases the fit of the paper applies, and which are beyond its range."""
 
 from __future__ import annotations
 

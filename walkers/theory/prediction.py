@@ -1,5 +1,4 @@
-"""Predictions of the theory for cases: model of the paper, motion with Coulomb friction,
-detachment, alignment.
+"""Predictions of the theory for cases: velocity, threshold, detachment, alignment.
 
 `walkers.theory.prediction_text` words them.
 """
@@ -128,8 +127,9 @@ def _contacts_open(motion: PredictedMotion) -> BoolArray:
 def _smallest_gamma(
     case: Case, largest_gamma: float, happens: Callable[[PredictedMotion], BoolArray]
 ) -> tuple[float, str | None]:
-    """The smallest Γ0 up to a largest one at which something happens to the walker of a case, NaN
-    if it does not.
+    """The smallest Γ0 at which something happens to the walker of a case.
+
+    It is sought up to a largest one, and is NaN if it does not happen there.
 
     The second value is the reason why the walker has no velocity there, None if it has one.
     """
@@ -155,8 +155,9 @@ def _smallest_gamma(
 
 
 def _opening(case: Case) -> dict[str, Any]:
-    """Γ0 up to which contacts stay closed in a periodic motion with Coulomb friction and drag, at a
-    case's frequency.
+    """Γ0 up to which contacts stay closed with Coulomb friction and viscous bridges.
+
+    The motion is periodic and has the frequency of the case.
 
     The table has ``gamma`` and the ``reason`` why the model ends there: the contact that opens, or
     that the forces have no solution. Without a reason, ``gamma`` is the largest that was tried.
@@ -215,8 +216,9 @@ def predict(case: Case) -> dict[str, Any]:
 
 
 def _by_the_paper(case: Case) -> dict[str, Any]:
-    """The velocity of a case's dimer in the model of the paper, m/s; NaN and the reason where it
-    does not hold.
+    """The velocity of a case's dimer in the model of the paper, m/s.
+
+    It is NaN, with the reason, where the model does not hold.
     """
     dimer = dimer_of(case)
     velocity = nan
@@ -243,8 +245,7 @@ def _why_no_velocity(motion: PredictedMotion, walker: int) -> str | None:
 
 
 def alignment_of(case: Case) -> dict[str, Any]:
-    """Compute whether the dimer of a case stays aligned with the axis, and otherwise the time until
-    it turns over.
+    """Compute whether the dimer of a case stays aligned with the axis of the drive.
 
     Returns
     -------
@@ -339,8 +340,9 @@ def _velocities_by_coulomb(
     quantity: str,
     contact: int | None,
 ) -> FloatArray:
-    """Values of a field of `PredictedMotion` for N cases, m/s, shape (N,); reasons for NaN are
-    counted in place.
+    """Values of a field of `PredictedMotion` for N cases, m/s, shape (N,).
+
+    The reasons for values that are NaN are counted in place.
     """
     values = np.full(len(cases), np.nan)
     motion = motion_of(*[cases[place] for place in applicable])
@@ -359,8 +361,9 @@ def _velocities_by_coulomb(
 def _velocities_by_the_paper(
     cases: Sequence[Case], applicable: Sequence[int], reasons: Counter[str]
 ) -> FloatArray:
-    """Velocities in the model of the paper for N cases, m/s, shape (N,); reasons for NaN are
-    counted in place.
+    """Velocities in the model of the paper for N cases, m/s, shape (N,).
+
+    The reasons for values that are NaN are counted in place.
     """
     velocities = np.full(len(cases), np.nan)
     for place in applicable:
@@ -376,8 +379,9 @@ def _velocities_by_the_paper(
 
 
 def _quantity_and_index(column: str) -> tuple[str | None, int | None]:
-    """Field of `PredictedMotion` of a column, and its index there; a field None: the theory does
-    not have the column.
+    """Field of `PredictedMotion` for a column, and the index there.
+
+    The field is None if the theory does not have the column.
 
     The third contact of the theory is that between the beads, ``sliding_pair_1`` in tables.
     """
@@ -392,8 +396,9 @@ def _quantity_and_index(column: str) -> tuple[str | None, int | None]:
 
 
 def _count_outside(cases: Sequence[Case], reasons: Counter[str]) -> None:
-    """Count the cases outside the range of the paper's measurements, all under the sentence about
-    the first of them.
+    """Count the cases outside the range of the paper's measurements.
+
+    All count under the sentence about the first of them.
     """
     sentences = []
     for case in cases:

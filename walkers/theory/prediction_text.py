@@ -69,9 +69,7 @@ def _engine_row(result: Mapping[str, Any] | None) -> list[str]:
 
 
 def _row(name: str, model: Mapping[str, Any]) -> list[str]:
-    """The velocities of a model (m/s) in mm/s, its threshold Γc, and the reason why it has no
-    velocity.
-    """
+    """The row of a model: velocities in mm/s, threshold Γc, reason for a missing velocity."""
     velocity = model["velocity"]
     speeds = []
     if velocity is None:

@@ -1,5 +1,4 @@
-"""The paper's model: a dimer whose beads stay in contact, under friction linear in the sliding
-velocity.
+"""The paper's model: a dimer in contact under friction linear in the sliding velocity.
 
 Symbols as in Khan et al., *Self-assembled granular walkers*: bead 1 is the large one, sin δ = (R1 -
 R2)/(R1 + R2) and μ = (m1 - m2)/M. Contacts 1 and 2 are the beads on the substrate, 3 is bead on
@@ -48,8 +47,9 @@ def normal_force_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
 
 
 def inertia_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
-    """The matrix G of M dv/dt = -M a (1, 1, 0) - G F∥ (Eq. 3 of the paper), solid spheres, shape
-    (…, 3, 3).
+    """The matrix G of M dv/dt = -M a (1, 1, 0) - G F∥, shape (…, 3, 3).
+
+    Eq. 3 of the paper, for solid spheres.
     """
     mu = mass_asymmetry(sin_delta)
     first = 5.0 / (1.0 + mu)
@@ -64,8 +64,9 @@ def inertia_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
 
 
 def rolling_matrix(first_radius: npt.ArrayLike, second_radius: npt.ArrayLike) -> FloatArray:
-    """The matrix H of q = H v, from sliding velocities to rolling rates (`walkers.physics.bridge`)
-    of closed contacts.
+    """The matrix H of q = H v, from sliding velocities to rolling rates of closed contacts.
+
+    `walkers.physics.bridge` defines the rolling rates.
 
     Parameters
     ----------
@@ -95,8 +96,9 @@ def _matrix(rows: list[list[FloatArray]]) -> FloatArray:
 
 
 def forces_at_rest(sin_delta: npt.ArrayLike) -> FloatArray:
-    """F0, shape (…, 3): the normal forces at rest that balance the capillary ones; perfect wetting,
-    no weight.
+    """F0, the normal forces at rest that balance the capillary ones, shape (…, 3).
+
+    They are for perfect wetting, without weight.
     """
     s = np.asarray(sin_delta, np.float64)
     return np.stack([1.0 + s, 1.0 - s, (1.0 - s**2) / 2.0], axis=-1)
@@ -126,8 +128,9 @@ class Detachment(NamedTuple):
 
 
 def detachment(sin_delta: npt.ArrayLike) -> Detachment:
-    """Smallest force along the axis, in either direction, that opens a contact of beads of equal
-    density, shape (…).
+    """Smallest force along the axis, in either direction, that opens a contact, shape (…).
+
+    The beads have equal density.
 
     The friction forces under a steady force follow from inertia alone, so that this holds for any
     friction law that allows them.
@@ -140,8 +143,9 @@ def detachment(sin_delta: npt.ArrayLike) -> Detachment:
 
 
 def mean_velocity(gamma0: npt.ArrayLike, sin_delta: npt.ArrayLike) -> FloatArray:
-    """Mean velocity for a quasi-static drive of ±Γ0/√2 under the paper's friction, m/s, positive
-    toward the large bead.
+    """Mean velocity in the paper's model, m/s, positive toward the large bead.
+
+    The drive is quasi-static, ±Γ0/√2, and friction is the paper's.
 
     Parameters
     ----------

@@ -1,5 +1,6 @@
-"""The implicit time steps of `walkers.theory.motion`, compiled by numba; walkers are integrated one
-by one.
+"""The implicit time steps of `walkers.theory.motion`, compiled by numba.
+
+Walkers are integrated one by one.
 """
 
 from __future__ import annotations
@@ -178,8 +179,9 @@ def _advance(  # noqa: PLR0913, PLR0917
     totals: FloatArray,
     work: FloatArray,
 ) -> bool:
-    """One time step, divided where a contact begins to stick or to slip; changes state and totals
-    in place.
+    """One time step, divided where a contact begins to stick or to slip.
+
+    State and totals change in place.
 
     Times are parts of a cycle. Returns whether friction forces were found at every stage.
     """
@@ -268,8 +270,9 @@ def _settle(  # noqa: PLR0913, PLR0917
     rest: Vector,
     work: FloatArray,
 ) -> bool:
-    """Find the friction forces and modes at the end of a stage, in place, by a semi-smooth Newton
-    method.
+    """Find the friction forces and modes at the end of a stage, in place.
+
+    The method is a semi-smooth Newton method.
 
     ``free`` and ``rest`` are the sliding velocities and normal forces without friction. A contact
     sticks if the force that keeps it at rest is within the limit, else it slips (Alart and Curnier,

@@ -1,5 +1,6 @@
-"""The closed form of Rabinovich et al. (2005): F = 2πRγ (cos θ / (1 + h/2d) + sin α sin(θ + α)),
-for small volumes.
+"""The closed form of Rabinovich et al. (2005) for small volumes.
+
+    F = 2πRγ (cos θ / (1 + h/2d) + sin α sin(θ + α))
 
 It was made for equal spheres of radius R; unequal spheres and planes use the Derjaguin radius, R =
 2R* (`walkers.physics.capillary.derjaguin_radius`). At a volume of 0.09 R³ on a plane its pull at
@@ -30,8 +31,7 @@ from walkers.physics.portable import cosine, sine
 def lambert(
     radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray
 ) -> FloatArray:
-    """Pull without the second term, as corrected by Lambert et al. (2008): 2πRγ cos θ / (1 + h /
-    2d).
+    """The first term as corrected by Lambert et al. (2008): 2πRγ cos θ / (1 + h / 2d).
 
     d, half the immersed height, from the volume: 2d/h = -1 + √(1 + 2V / πRh²) (Rabinovich et al.,
     Eq. 20). Parameters and result as for `walkers.physics.laws.soulie.pull`.
@@ -45,8 +45,9 @@ def lambert(
 def pull(
     radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray
 ) -> FloatArray:
-    """Rabinovich et al. (2005), Eq. 19: `lambert`, and 2πRγ sin α sin(θ + α) with α² = 2d/R (their
-    Eq. A3).
+    """Rabinovich et al. (2005), Eq. 19.
+
+    The second term, in addition to `lambert`, is 2πRγ sin α sin(θ + α) with α² = 2d/R (Eq. A3).
     """
     radius = derjaguin_radius(radius_1, radius_2)
     immersed = np.sqrt(gaps**2 + 2.0 * volume / (pi * radius)) - gaps
@@ -56,9 +57,7 @@ def pull(
 
 
 def law(surfaces: Surfaces) -> Curve:
-    """Pull of Rabinovich et al. (Eq. 19), rupture distance of Lian et al., and Reynolds
-    resistances.
-    """
+    """Force of Rabinovich et al., rupture distance of Lian et al., Reynolds resistances."""
     contact_angle = surfaces.liquid.contact_angle
 
     def pull_at(gaps: FloatArray) -> FloatArray:

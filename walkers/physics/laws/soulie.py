@@ -1,5 +1,6 @@
-"""The law of standard LIGGGHTS, corrected at walls: Soulié's force, lubrication of immersed spheres
-at all gaps.
+"""The law of standard LIGGGHTS, corrected at walls.
+
+It has Soulié's force, and the lubrication of immersed spheres at all gaps.
 
     F = πγ √(R1 R2) (exp(A h/R2 + B) + C),        R2 the larger radius, h the gap
     N = 6πηR*/x,        S = 6πηR* (8/15 ln(1/x) + 0.9588),        x = max(ε, h/R*)

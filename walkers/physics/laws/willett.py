@@ -1,5 +1,6 @@
-"""The fit of Willett et al. (2000) to their solutions of the Young–Laplace equation, F = 2πRγ
-exp(f1 - f2 exp(…)).
+"""The fit of Willett et al. (2000) to their solutions of the Young–Laplace equation.
+
+    F = 2πRγ exp(f1 - f2 exp(…))
 
 It was made for equal spheres of radius R, volumes of 0.1 to 10 per cent of R³ and contact angles up
 to 50°; unequal spheres and planes use the Derjaguin radius, R = 2R*
@@ -71,8 +72,9 @@ def _by_volume_and_angle(
 def pull(
     radius_1: float, radius_2: float, volume: float, contact_angle: float, gaps: FloatArray
 ) -> FloatArray:
-    """Willett et al. (2000), appendix: ln(F / 2πRγ) = f1 - f2 exp(f3 ln s + f4 ln² s), s half the
-    gap over √(V/R).
+    """Willett et al. (2000), appendix: ln(F / 2πRγ) = f1 - f2 exp(f3 ln s + f4 ln² s).
+
+    s is half the gap over √(V/R).
 
     Parameters and result as for `walkers.physics.laws.soulie.pull`.
     """
@@ -89,8 +91,9 @@ def pull(
 
 
 def rupture(radius_1: float, radius_2: float, volume: float, contact_angle: float) -> float:
-    """Willett et al. (2000), Eq. 15, for equal spheres: (1 + θ/2) (V^(1/3) + 0.1 V^(2/3) / R),
-    m.
+    """Rupture distance (1 + θ/2) (V^(1/3) + 0.1 V^(2/3) / R), m.
+
+    Willett et al. (2000), Eq. 15, for equal spheres.
     """
     radius = derjaguin_radius(radius_1, radius_2)
     return (1.0 + 0.5 * contact_angle) * (cube_root(volume) + 0.1 * cube_root(volume) ** 2 / radius)

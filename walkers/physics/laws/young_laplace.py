@@ -1,5 +1,4 @@
-"""The Young–Laplace equation, solved numerically: force and rupture distance, with Reynolds'
-resistances.
+"""The Young–Laplace equation, solved numerically, with Reynolds' resistances.
 
 The capillary force between beads and at a plane is the closed solution of `walkers.physics.laplace`
 for the given volume and contact angle. The bridge breaks at the largest gap at which the equation
@@ -82,8 +81,9 @@ def _place(shape: _Shape) -> Path:
 
 @lru_cache(maxsize=4096)
 def _solved(shape: _Shape) -> tuple[float, Chebyshev]:
-    """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture), in units of the bead's
-    radius.
+    """Rupture distance, and F/γ as a polynomial in √(1 - h/rupture).
+
+    Both are in units of the bead's radius.
     """
     numbers = cached_numbers(_place(shape), lambda: _solve(shape))
     return float(numbers[0]), Chebyshev(numbers[1:], domain=[0.0, 1.0])
