@@ -108,13 +108,13 @@ def test_derivatives_of_a_bridge_are_those_of_its_residuals(
 _DIGESTS = """
 import json, sys
 from walkers import load_case
-from walkers.templates.bridge_tables import Table
+from walkers.templates.bridge_tables import BridgeTable
 from walkers.templates.deck import bridge_tables_digest
 
 def all_bits(table):
     return f"{table.curve.rupture.hex()} {table.gaps.tobytes().hex()} {table.rows.tobytes().hex()}"
 
-Table.text = all_bits  # tables have twelve digits, which would hide most differences
+BridgeTable.text = all_bits  # tables have twelve digits, which would hide most differences
 print(json.dumps({name: bridge_tables_digest(load_case(name)) for name in sys.argv[1:]}))
 """
 

@@ -24,7 +24,7 @@ from walkers.inputs.reading import load_case
 from walkers.physics.capillary import derjaguin_radius
 from walkers.postprocess.measure.motion import Motion
 from walkers.runner.failures import EngineFailure
-from walkers.runner.launch import ALONE
+from walkers.runner.process import ALONE
 from walkers.second_engine.crosscheck import divergence_lines
 from walkers.second_engine.lines import Line, Verdict, as_dict, failures, lines_text
 

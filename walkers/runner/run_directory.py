@@ -183,7 +183,7 @@ def case_of(directory: Path) -> Case:
     Raises
     ------
     OSError, ValueError
-        If the case is unreadable, or its file has changed (`FileChanged`).
+        If the case is unreadable, or its file has changed (`walkers.runner.manifest.FileChanged`).
     """
     status = (directory / CASE_NAME).stat()
     identity = (status.st_ino, status.st_mtime_ns, status.st_size)

@@ -35,8 +35,8 @@ class FlatCase(dict[str, Any]):
     Attributes
     ----------
     origin_words
-        For each key, where its value is from: ``given``, ``library``, ``default`` … (`Origin.word`
-        of `walkers.inputs.origins`).
+        For each key, where its value is from: ``given``, ``library``, ``default`` …
+        (`walkers.inputs.origins.Origin.word`).
     """
 
     origin_words: Mapping[str, str] = {}

@@ -433,7 +433,7 @@ def _uncertain_keys(results: Results) -> set[str]:
 
 def _uncertain_values(results: Results) -> list[dict[str, Any]]:
     """The values with a range on which a result rests."""
-    return [value for value in results.about["uncertain_values"] if value["range"]]
+    return [value for value in results.about["rests_on"] if value["range"]]
 
 
 def _band_text(results: Results) -> str:

@@ -68,7 +68,7 @@ def _uncertain_values(table: SweepTable) -> list[dict[str, Any]]:
     """The uncertain values of the runs, without those that the sweep varies."""
     values = {}
     for result in table.results.values():
-        for value in result.about["uncertain_values"]:
+        for value in result.about["rests_on"]:
             if value["key"] not in table.frame:
                 values[value["key"]] = value
     return list(values.values())

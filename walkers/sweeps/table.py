@@ -417,7 +417,7 @@ def _csv_bytes(frame: pd.DataFrame) -> bytes:
 
 
 def _json_bytes(frame: pd.DataFrame) -> bytes:
-    """The table as JSON; not by `DataFrame.to_json`, which rounds to decimals."""
+    """The table as JSON; not by `pandas.DataFrame.to_json`, which rounds to decimals."""
     rows = frame.astype(object).where(frame.notna(), None).to_dict("records")
     contents = {"units": frame.attrs["units"], "meanings": frame.attrs["meanings"], "points": rows}
     return json_bytes(contents)

@@ -149,7 +149,7 @@ class Deck:
     log_limit
         Largest size of its log, bytes.
     beyond_limits
-        Whether the time step exceeds a limit (`run.allow_unstable`).
+        Whether the time step exceeds a limit (key ``run.allow_unstable``).
     """
 
     text: str

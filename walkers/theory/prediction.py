@@ -329,8 +329,8 @@ def predicted_column(
         by_paper = _velocities_by_the_paper(cases, applicable, reasons)
     _count_outside(cases, reasons)
     predictions = {COULOMB_MODEL: by_coulomb, PAPER_FIT: by_paper}
-    known = {model: values for model, values in predictions.items() if np.isfinite(values).any()}
-    return known, dict(reasons)
+    applied = {model: values for model, values in predictions.items() if np.isfinite(values).any()}
+    return applied, dict(reasons)
 
 
 def _velocities_by_coulomb(

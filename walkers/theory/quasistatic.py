@@ -1,6 +1,6 @@
 """The paper's model: a dimer in contact under friction linear in the sliding velocity.
 
-Symbols as in Khan et al., *Self-assembled granular walkers*: bead 1 is the large one, sin δ = (R1 -
+Symbols as in Khan et al., *Self-assembled granular walkers*: bead 1 is the large ones, sin δ = (R1 -
 R2)/(R1 + R2) and μ = (m1 - m2)/M. Contacts 1 and 2 are the beads on the substrate, 3 is bead on
 bead; x points from bead 2 to bead 1. Forces are in units of 4πγR̄, in which the force of the drive
 is Γ0.
@@ -34,12 +34,12 @@ def normal_force_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
     """
     s = np.asarray(sin_delta, np.float64)
     mu = mass_asymmetry(s)
-    one = np.ones_like(s)
+    ones = np.ones_like(s)
     first_share = (1.0 + mu) / 2.0
     second_share = (1.0 - mu) / 2.0
     rows = [
-        [-second_share * s, first_share * s, -one],
-        [second_share * s, -first_share * s, one],
+        [-second_share * s, first_share * s, -ones],
+        [second_share * s, -first_share * s, ones],
         [second_share, -first_share, s],
     ]
     matrix: FloatArray = _matrix(rows) / np.sqrt(1.0 - s**2)[..., None, None]
@@ -54,10 +54,10 @@ def inertia_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
     mu = mass_asymmetry(sin_delta)
     first = 5.0 / (1.0 + mu)
     second = 5.0 / (1.0 - mu)
-    one = np.ones_like(mu)
+    ones = np.ones_like(mu)
     rows = [
-        [1.0 + first, one, first],
-        [one, 1.0 + second, second],
+        [1.0 + first, ones, first],
+        [ones, 1.0 + second, second],
         [first, second, first + second],
     ]
     return _matrix(rows)

@@ -104,7 +104,7 @@ class VesselShape(Container):
         return list(self.vessel.points[self.vessel.triangles])
 
     def layers(self, largest: float, bodies_top: float) -> Iterator[Layer]:
-        """Layers up to twice the height of the vessel (see `Shape.layers`).
+        """Layers up to twice the height of the vessel (see ``Shape.layers``).
 
         A layer with many places comes in several strips along x, which have the same level.
         """
@@ -127,7 +127,7 @@ class VesselShape(Container):
                     yield Layer(places=x_and_y, pitch=pitch, tight=True, level=level)
 
     def check_pour(self, count: int, largest: float, bodies_top: float) -> None:
-        """Raise `InputError` unless the beads fit (see `Shape.check_pour`)."""
+        """Raise `InputError` unless the beads fit (see ``Shape.check_pour``)."""
         place_count = 0
         for layer in self.layers(largest, bodies_top):
             place_count += len(layer.places)
@@ -160,9 +160,9 @@ class MeshVesselShape(VesselShape):
         return self.vessel.facets
 
     def damping(self, radius: float) -> float:  # noqa: ARG002
-        """See `Shape.damping`; a bead may touch two faces whose normals are nearly the same."""
+        """See ``Shape.damping``; a bead may touch two faces whose normals are nearly the same."""
         return 2.0
 
     def side_clearance(self, places: FloatArray) -> FloatArray:
-        """Distances (n,) of places (n, 3) from the surface, m; negative outside (see `Shape`)."""
+        """Distances (n,) of places (n, 3) from the surface, m; negative outside (see ``Shape``)."""
         return self.vessel.clearance(places)
