@@ -97,12 +97,15 @@ def _show_theory(case: str, lookup: LookupOptions, as_json: bool) -> None:
 
 def _number_of_draws(spread: bool, points: int | None) -> int:
     """Number of runs of a spread; 0 without ``--spread``."""
-    from walkers.sweeps.spread import POINTS
+    from walkers.sweeps.spread import POINTS, check_number_of_draws
 
     refuse("--points", points is not None and not spread, "is for --spread")
     if not spread:
         return 0
-    return POINTS if points is None else points
+    if points is None:
+        return POINTS
+    check_number_of_draws(points)
+    return points
 
 
 def run(

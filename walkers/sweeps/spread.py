@@ -117,6 +117,11 @@ class Spread:
         return contents
 
 
+def check_number_of_draws(points: int) -> None:
+    """Raise `InputError` if a number of draws is out of its limits, 2 to 4096."""
+    check_limits("points", points, 2, 4096)
+
+
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> SweepDefinition:
     """A sweep over the uncertain values of a case by Sobol's sequence.
 
@@ -138,7 +143,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         If no value is uncertain, a range does not contain the value of the case, or the number of
         points is out of its limits.
     """
-    check_limits("points", points, 2, 4096)
+    check_number_of_draws(points)
     varied = _uncertain_values(case)
     if not varied:
         raise input_error(
