@@ -23,8 +23,8 @@ from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.shapes.shape import LOOSE
 from walkers.inputs.tables.shapes.walls import FLOOR
 from walkers.postprocess.measure.motion import read_bridges
+from walkers.postprocess.show.meshes import walls_of
 from walkers.postprocess.show.necks import ends_of
-from walkers.postprocess.show.scene import walls_of
 from walkers.runner.binary import find_engine
 from walkers.runner.run_directory import run_place
 from walkers.runs.preview import preview_text, summarise

@@ -28,6 +28,7 @@ from walkers.inputs.tables.boundary import Boundary
 from walkers.postprocess.measure.motion import Group, Motion, read_bridges, read_motion
 from walkers.postprocess.measure.results import read_results
 from walkers.postprocess.measure.tables import read_table
+from walkers.postprocess.show.camera import axes_toward, camera_axes
 from walkers.postprocess.show.figures import (
     MOST_NAMED,
     _interpolated,
@@ -37,18 +38,12 @@ from walkers.postprocess.show.figures import (
 )
 from walkers.postprocess.show.film_options import FilmOptions
 from walkers.postprocess.show.films import film_times
+from walkers.postprocess.show.meshes import mesh_of, walls_of
 from walkers.postprocess.show.necks import NO_BRIDGES, bridges_at, ends_of, necks_of
 from walkers.postprocess.show.paraview import _walls, write_vtk
-from walkers.postprocess.show.scene import (
-    Scene,
-    Window,
-    axes_toward,
-    camera_axes,
-    gathered,
-    mesh_of,
-    walls_of,
-)
+from walkers.postprocess.show.scene import Scene, gathered
 from walkers.postprocess.show.series import _figure
+from walkers.postprocess.show.window import Window
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,7 @@ import numpy as np
 from studies.paper.sources import Sources, described, ruby, thresholds_with_theory
 from walkers.arrays import FloatArray
 from walkers.postprocess.measure.gait import gait
+from walkers.postprocess.show.camera import axes_toward
 from walkers.postprocess.show.drawing import (
     ONE_COLUMN,
     TWO_COLUMNS,
@@ -19,7 +20,8 @@ from walkers.postprocess.show.drawing import (
     styled,
 )
 from walkers.postprocess.show.necks import bridges_at
-from walkers.postprocess.show.scene import Scene, Window, axes_toward
+from walkers.postprocess.show.scene import Scene
+from walkers.postprocess.show.window import Window
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.record import read_sweep_record

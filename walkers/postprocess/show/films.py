@@ -20,10 +20,13 @@ from walkers.errors import WalkersError, input_error
 from walkers.extras import require
 from walkers.files import replacing
 from walkers.postprocess.measure.motion import Motion, read_motion
-from walkers.postprocess.show import scene as view
+from walkers.postprocess.show.camera import camera_axes, from_above, named_direction
 from walkers.postprocess.show.drawing import check_place
 from walkers.postprocess.show.film_options import FilmOptions
+from walkers.postprocess.show.meshes import round_below
 from walkers.postprocess.show.necks import bridges_at, bridges_text
+from walkers.postprocess.show.scene import Scene, motion_in_view
+from walkers.postprocess.show.window import Picture, Window
 from walkers.progress import Progress, Tell
 
 _AROUND, _AROUND_TRAY = (
@@ -63,18 +66,18 @@ def render_film(
         raise input_error("size", f"{wide}x{tall}: expected even numbers for an MP4")
     else:
         require("film")
-    motion, _ = view.motion_in_view(read_motion(directory).driven, options.walker)
+    motion, _ = motion_in_view(read_motion(directory).driven, options.walker)
     times = film_times(motion, options)
     count, frames = len(times.time), slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
-    around = _AROUND_TRAY if view.from_above(motion.case) else _AROUND
-    whole = view.Scene.around(motion, view.camera_axes(motion), around, frames, rolling=True)
+    around = _AROUND_TRAY if from_above(motion.case) else _AROUND
+    whole = Scene.around(motion, camera_axes(motion), around, frames, rolling=True)
     scene = whole.following(wide / tall, _AROUND, frames)
     bridges = bridges_at(motion, times.frame)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with closing(view.Window(scene, options.size)) as window, replacing(path) as new:
+    with closing(Window(scene, options.size)) as window, beside(path) as new:
         write = _captions(scene, times, window.pixels_per_mm, options.size)
 
-        def pictures(numbers: Iterable[int], tell: Tell | None = None) -> Iterator[view.Picture]:
+        def pictures(numbers: Iterable[int], tell: Tell | None = None) -> Iterator[Picture]:
             for number in numbers:
                 yield write(window.picture(times.frame[number], bridges[number]), number)
                 if tell is not None:
@@ -119,7 +122,7 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
         largest = _SECONDS / (end - begin)
         if not follows:
             largest = min(largest, 1.0 / (_LEAST_SEEN * float(np.median(np.diff(motion.time)))))
-        slowdown = max(1.0, view.round_below(largest))
+        slowdown = max(1.0, round_below(largest))
     interval, cycle = 1.0 / (options.fps * slowdown), 1.0 / motion.case.excitation.frequency
     time = begin + interval * np.arange(int((end - begin) / interval + 1e-9) + 1)
     strobed = interval >= cycle / 2.0
@@ -133,14 +136,14 @@ def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
 
 
 def _captions(
-    scene: view.Scene, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
-) -> Callable[[view.Picture, int], view.Picture]:
+    scene: Scene, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
+) -> Callable[[Picture, int], Picture]:
     """A function that draws time, distance, slow motion, drive, tilt, scale bar and gravity into a picture."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
 
     (wide, tall), case = size, scene.motion.case
-    above = view.from_above(case) or wide > 2 * tall  # of the beads, no room is left beside them
+    above = from_above(case) or wide > 2 * tall  # of the beads, no room is left beside them
     edge = max(_LEAST_LETTERS, min(tall // _LETTERS, wide // _WIDE))
     # Pillow's own font has no × and no ².
     font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
@@ -148,8 +151,8 @@ def _captions(
     # All pictures may show the same frame.
     decimals = max(0, ceil(-log10(float(np.diff(times.time).max(initial=0.0)) or 1.0) - 1e-9))
     speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
-    bar = view.round_below(wide / 5.0 / pixels_per_mm)
-    toward, direction = view.named_direction(scene.motion)
+    bar = round_below(wide / 5.0 / pixels_per_mm)
+    toward, direction = named_direction(scene.motion)
     left, right, level, thick = (
         wide - edge - bar * pixels_per_mm,
         wide - edge,
@@ -157,7 +160,7 @@ def _captions(
         max(2, edge // 8),
     )
 
-    def written(picture: view.Picture, number: int) -> view.Picture:
+    def written(picture: Picture, number: int) -> Picture:
         page = Image.fromarray(picture)
         draw = ImageDraw.Draw(page)
         clock, lines = f"{times.time[number]:.{decimals}f} s", [speed]
@@ -205,9 +208,7 @@ def speed_text(slowdown: float) -> str:
     return f"{slowdown:.4g} × slower" if slowdown > 1.0 else f"{1.0 / slowdown:.4g} × faster"
 
 
-def _write_mp4(
-    path: Path, pictures: Iterator[view.Picture], options: FilmOptions, count: int
-) -> None:
+def _write_mp4(path: Path, pictures: Iterator[Picture], options: FilmOptions, count: int) -> None:
     """Write H.264 with ffmpeg, which does not report a full disk."""
     from imageio_ffmpeg import count_frames_and_secs, write_frames
 
@@ -239,9 +240,7 @@ def _write_mp4(
         )
 
 
-def _write_gif(
-    path: Path, pictures: Iterator[view.Picture], fps: int, samples: view.Picture
-) -> None:
+def _write_gif(path: Path, pictures: Iterator[Picture], fps: int, samples: Picture) -> None:
     """Write all pictures with one palette and no dithering, so that parts at rest need no space."""
     from PIL import Image
 

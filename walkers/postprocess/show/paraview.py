@@ -21,8 +21,10 @@ from walkers.files import VTK_SCRATCH, scratch_folder
 from walkers.postprocess.measure import piles
 from walkers.postprocess.measure.clusters import connected
 from walkers.postprocess.measure.motion import Bridges, Motion, read_bridges, read_motion
+from walkers.postprocess.show.camera import camera_axes
+from walkers.postprocess.show.meshes import mesh_of, walls_of
 from walkers.postprocess.show.necks import ends_of
-from walkers.postprocess.show.scene import Scene, camera_axes, gathered, mesh_of, walls_of
+from walkers.postprocess.show.scene import Scene, gathered
 
 if TYPE_CHECKING:
     import meshio

@@ -17,6 +17,7 @@ import numpy as np
 from walkers.arrays import FloatArray
 from walkers.errors import check_limits
 from walkers.postprocess.measure.motion import Motion, read_motion
+from walkers.postprocess.show.camera import from_the_side, named_direction, plan_axes
 from walkers.postprocess.show.drawing import (
     check_place,
     new_figure,
@@ -25,15 +26,8 @@ from walkers.postprocess.show.drawing import (
     styled,
 )
 from walkers.postprocess.show.necks import EXPLAINED, bridges_at
-from walkers.postprocess.show.scene import (
-    Scene,
-    Window,
-    from_the_side,
-    gathered,
-    motion_in_view,
-    named_direction,
-    plan_axes,
-)
+from walkers.postprocess.show.scene import Scene, gathered, motion_in_view
+from walkers.postprocess.show.window import Window
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -15,7 +15,8 @@ import numpy as np
 from walkers.arrays import FloatArray, IntArray
 from walkers.extras import require
 from walkers.postprocess.measure.motion import Motion
-from walkers.postprocess.show import scene as view
+from walkers.postprocess.show.camera import against_gravity, axes_toward, camera_axes, from_the_side
+from walkers.postprocess.show.meshes import beach_ball, floor_lines, mesh_of, round_below, walls_of
 from walkers.postprocess.show.necks import (
     BLUE,
     OPACITY,
@@ -26,6 +27,7 @@ from walkers.postprocess.show.necks import (
     necks_of,
     triangles_of,
 )
+from walkers.postprocess.show.scene import Scene, gathered
 
 if TYPE_CHECKING:
     import k3d
@@ -54,9 +56,9 @@ def player_of(
     import k3d
 
     motion, stride, captions = _thinned(motion.driven, places)
-    motion = view.gathered(motion, lane=_LANE)
-    scene = view.Scene.around(
-        motion, view.camera_axes(motion), _AROUND, shaken=False, rolling=True
+    motion = gathered(motion, lane=_LANE)
+    scene = Scene.around(
+        motion, camera_axes(motion), _AROUND, shaken=False, rolling=True
     ).following(_ASPECT, _AROUND)
     shown, path = motion.select(slice(None, None, stride)), scene.path
     bridges = bridges_at(motion, np.arange(0, len(motion.time), stride))
@@ -90,7 +92,7 @@ def player_of(
         beads = [_points(shown, colours[0])]
     else:
         beads = _balls(shown, scene.turned[::stride], colours)
-    boundary = _walls(motion, view.round_below(scene.height(_ASPECT) / 5.0))
+    boundary = _walls(motion, round_below(scene.height(_ASPECT) / 5.0))
     if path is not None:
         back = np.tile(np.eye(4), (len(path), 1, 1))
         back[:, :3, 3] = np.round(-path / _GRID) * _GRID
@@ -120,7 +122,7 @@ def camera_of(motion: Motion, path: FloatArray | None = None) -> list[float]:
     ``path`` is subtracted from the positions of the beads (`walkers.postprocess.show.scene.Scene`).
     """
     axes = _axes_of_camera(motion)
-    seen = view.Scene.around(motion, axes, _AROUND, shaken=False, path=path)
+    seen = Scene.around(motion, axes, _AROUND, shaken=False, path=path)
     distance = (
         seen.height(_ASPECT) / 2.0 / tan(radians(_VIEW / 2.0))
         + float(seen.high[2] - seen.low[2]) / 2.0
@@ -131,10 +133,10 @@ def camera_of(motion: Motion, path: FloatArray | None = None) -> list[float]:
 
 def _axes_of_camera(motion: Motion) -> FloatArray:
     """The axes of the picture that the camera sees: to the right, up, and toward the camera, unit vectors."""
-    toward = view.camera_axes(motion)[2]
+    toward = camera_axes(motion)[2]
     if motion.case.boundary.closed:
-        toward = np.array([-0.25, -1.0, 0.2 if view.from_the_side(motion.case) else 2.0])
-    return view.axes_toward(toward, view.against_gravity(motion))
+        toward = np.array([-0.25, -1.0, 0.2 if from_the_side(motion.case) else 2.0])
+    return axes_toward(toward, against_gravity(motion))
 
 
 def _thinned(motion: Motion, places: int) -> tuple[Motion, int, list[str]]:
@@ -168,7 +170,7 @@ def _balls(motion: Motion, turned: FloatArray, colours: FloatArray) -> list[Any]
     import k3d
     from scipy.spatial.transform import Rotation
 
-    points, triangles, pale = view.beach_ball(24, motion)
+    points, triangles, pale = beach_ball(24, motion)
     balls, unit = [], points.astype(np.float32)
     for bead, radius in enumerate(motion.radius * 1e3):
         matrices = np.tile(np.eye(4), (len(motion.time), 1, 1))
@@ -254,12 +256,12 @@ def _walls(motion: Motion, step: float) -> list[Any]:
     """The boundary, with transparent side walls, and lines on a bare floor with a spacing (mm)."""
     import k3d
 
-    faces, parts = [1e3 * corners for corners in view.walls_of(motion)], []
+    faces, parts = [1e3 * corners for corners in walls_of(motion)], []
     for level in (True, False):
         some = [corners for corners in faces if (np.ptp(corners[:, 2]) < 1e-6) == level]
         if not some:
             continue
-        mesh = view.mesh_of(some).triangulate()
+        mesh = mesh_of(some).triangulate()
         points = np.asarray(
             mesh.points - [0.0, 0.0, 2e-3 * level], dtype=np.float32
         )  # below beads that touch it
@@ -276,8 +278,8 @@ def _walls(motion: Motion, step: float) -> list[Any]:
         )
     if motion.case.boundary.bare:
         low, high = faces[0].min(axis=0), faces[0].max(axis=0)
-        step = max(step, view.round_below(float(np.ptp([low, high])) / _MOST_LINES))
-        ends = view.floor_lines(low, high, step).astype(np.float32)
+        step = max(step, round_below(float(np.ptp([low, high])) / _MOST_LINES))
+        ends = floor_lines(low, high, step).astype(np.float32)
         pairs = np.arange(len(ends), dtype=np.uint32).reshape(-1, 2)
         look = {
             "indices_type": "segment",
