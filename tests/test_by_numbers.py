@@ -31,7 +31,7 @@ from walkers.postprocess.measure.uncertainty import SPREAD_NAME, bands_of, sprea
 from walkers.postprocess.measure.walking import _doubts, _posture, _scatter, _velocities, tables_of
 from walkers.postprocess.show.films import speed_text
 from walkers.postprocess.show.report.player import _points
-from walkers.postprocess.show.scene import Scene, rotations_at, turned_in
+from walkers.postprocess.show.scene import Scene, orientations_of, rotations_at
 from walkers.runner.cost import predicted_overhead
 from walkers.runner.manifest import iso_time
 from walkers.runs.making import progress_in
@@ -799,7 +799,7 @@ def test_a_bead_turns_about_axes_that_stay_where_they_are() -> None:
         (0.0, 0.0, quarter),
         (quarter, 0.0, 0.0),
     )  # means since the frame before
-    turned = turned_in(replace(motion, mean_spin=spin))
+    turned = orientations_of(replace(motion, mean_spin=spin))
     assert turned is not None
     half = [0.0, sqrt(0.5), sqrt(0.5)]
     for frame, expected in {

@@ -33,7 +33,7 @@ from walkers.postprocess.measure.numbers import number_text, rows
 from walkers.postprocess.measure.results import not_computed, read_results
 from walkers.postprocess.measure.tables import read_table
 from walkers.postprocess.show.figures import figures_of
-from walkers.postprocess.show.report.page import LARGEST, svg_of
+from walkers.postprocess.show.report.page import LARGEST_REPORT, svg_of
 from walkers.postprocess.show.report.player import camera_of, player_of
 from walkers.postprocess.show.report.run import report_run
 from walkers.postprocess.show.scene import gathered
@@ -124,7 +124,7 @@ def test_numbers_of_a_report_are_the_results_with_what_is_not_computed_and_param
     page, results = Report(path), read_results(directory)
     assert all(f"{row.label}{row.text}{row.unit}{row.error}" in page.words for row in rows(results))
     assert f"Uncertainty not computed: {not_computed(results).text}." in page.words
-    assert path.stat().st_size < LARGEST
+    assert path.stat().st_size < LARGEST_REPORT
     origins = walkers.load(directory).case.origins
     for said in (
         "given",

@@ -24,7 +24,7 @@ from walkers.inputs.tables.shapes.shape import LOOSE
 from walkers.inputs.tables.shapes.walls import FLOOR
 from walkers.postprocess.measure.motion import read_bridges
 from walkers.postprocess.show.meshes import walls_of
-from walkers.postprocess.show.necks import ends_of
+from walkers.postprocess.show.necks import bridge_ends
 from walkers.runner.binary import find_engine
 from walkers.runner.run_directory import run_place
 from walkers.runs.preview import preview_text, summarise
@@ -515,7 +515,7 @@ def test_beads_are_poured_into_a_vessel_and_stay_there(tmp_path: Path, boundary:
     places = zip(numbers, motion.position[-1, beads], strict=True)
     gaps = [float(walls[wall].distances(place)) for wall, place in places] - motion.radius[beads]
     np.testing.assert_allclose(gaps, bridges.gap[len(bridges.beads) :], atol=1e-9)
-    _, ends = ends_of(motion, motion.position[-1], bridges.contacts[len(bridges.beads) :])
+    _, ends = bridge_ends(motion, motion.position[-1], bridges.contacts[len(bridges.beads) :])
     np.testing.assert_allclose(done.case.boundary.vessel.clearance(ends), 0.0, atol=1e-9)
     if boundary == "funnel":
         with pytest.raises(InputError, match="the second engine knows no facets"):

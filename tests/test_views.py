@@ -39,7 +39,7 @@ from walkers.postprocess.show.figures import (
 from walkers.postprocess.show.film_options import FilmOptions
 from walkers.postprocess.show.films import film_times
 from walkers.postprocess.show.meshes import mesh_of, walls_of
-from walkers.postprocess.show.necks import NO_BRIDGES, bridges_at, ends_of, necks_of
+from walkers.postprocess.show.necks import NO_BRIDGES, bridge_ends, bridges_at, neck_surfaces
 from walkers.postprocess.show.paraview import _walls, write_vtk
 from walkers.postprocess.show.scene import Scene, gathered
 from walkers.postprocess.show.series import _figure
@@ -362,8 +362,8 @@ def test_a_neck_has_the_volume_of_its_bridge(
         place = np.array(
             [[0.0, 0.0, radius + gap], [radius + gap + motion.radius[1], 0.0, radius + gap]]
         )
-        begins, ends = ends_of(motion, place, np.array([contact]))
-        points, _ = necks_of(motion, np.array([contact]), (begins, ends), 65, 64)
+        begins, ends = bridge_ends(motion, place, np.array([contact]))
+        points, _ = neck_surfaces(motion, np.array([contact]), (begins, ends), 65, 64)
         length = np.linalg.norm(ends - begins)
         assert length == pytest.approx(radius + gap + other)
         height = (1e-3 * points[0] - begins[0]) @ (ends - begins)[0] / length
@@ -435,9 +435,9 @@ def test_the_camera_follows_a_walker_that_walks_far(
         single, position=single.position + way[:, None, None] * np.array(single.case.drive_axis)
     )
     scene = Scene.around(far, camera_axes(far), 1.2, shaken=False).following(1.5, 1.2)
-    assert (scene.path is not None) == follows
+    assert (scene.camera_path is not None) == follows
     if follows:
-        assert np.linalg.norm(scene.moved(len(far.time) - 1)) == pytest.approx(
+        assert np.linalg.norm(scene.camera_displacement(len(far.time) - 1)) == pytest.approx(
             1e3 * way[-1], rel=0.05
         )
     with closing(Window(scene, (300, 200))) as window:

@@ -28,7 +28,7 @@ from walkers.postprocess.show.drawing import FORMATS, check_place, save_figure
 from walkers.postprocess.show.figures import plot_run
 from walkers.postprocess.show.film_options import FilmOptions
 from walkers.postprocess.show.films import render_film
-from walkers.postprocess.show.report.page import NAME as REPORT_NAME
+from walkers.postprocess.show.report.page import REPORT_NAME
 from walkers.postprocess.show.report.player import player_of
 from walkers.postprocess.show.report.run import report_run, result_html
 from walkers.postprocess.show.series import render_series

@@ -11,7 +11,7 @@ from walkers.errors import InputError
 from walkers.files import write_bytes
 from walkers.postprocess.measure.results import Results
 from walkers.postprocess.measure.uncertainty import uncertain_value_lines
-from walkers.postprocess.show.report.page import NAME, check_report, fill, page_of, svg_of
+from walkers.postprocess.show.report.page import REPORT_NAME, check_report, fill, page_of, svg_of
 from walkers.sweeps.factors import readable_key
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
@@ -76,9 +76,9 @@ def _uncertain_values(table: SweepTable) -> list[dict[str, Any]]:
 
 def _link(result: Results | None, path: Path) -> str:
     """The relative link from a page to the report of a run; empty if there is none."""
-    if result is None or not (result.directory / NAME).is_file():
+    if result is None or not (result.directory / REPORT_NAME).is_file():
         return ""
-    return os.path.relpath(result.directory / NAME, path.absolute().parent)
+    return os.path.relpath(result.directory / REPORT_NAME, path.absolute().parent)
 
 
 def _figure(table: SweepTable) -> tuple[str, list[str]]:

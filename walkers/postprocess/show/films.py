@@ -164,12 +164,12 @@ def _captions(
         page = Image.fromarray(picture)
         draw = ImageDraw.Draw(page)
         clock, lines = f"{times.time[number]:.{decimals}f} s", [speed]
-        if scene.path is not None:
+        if scene.camera_path is not None:
             lines.append(
-                f"{scene.moved(times.frame[number]) @ toward:z.1f} mm {direction} from the start"
+                f"{scene.camera_displacement(times.frame[number]) @ toward:z.1f} mm {direction} from the start"
             )
         lines += [case.boundary.tilted] if case.boundary.tilted else []
-        lines += scene.explained
+        lines += scene.colour_legend
         lines += bridges_text(case).split(", ")  # lines of their own beside the beads
         draw.text((edge, edge), clock, "black", large, anchor="lt")
         if above:

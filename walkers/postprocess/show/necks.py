@@ -20,9 +20,9 @@ from walkers.inputs.tables.case import Case
 from walkers.physics.capillary import bridge_volume
 from walkers.postprocess.measure.motion import Motion, read_bridges
 
-BLUE, OPACITY = 0x3FA0FF, 0.8
+NECK_COLOUR, NECK_OPACITY = 0x3FA0FF, 0.8
 """Colour of necks; they are translucent."""
-EXPLAINED = "blue: liquid bridges"
+NECK_LEGEND = "blue: liquid bridges"
 Ends = tuple[FloatArray, FloatArray]
 NO_BRIDGES: IntArray = np.empty((0, 3), dtype=np.int64)
 _ENDS, _WAIST = (
@@ -49,12 +49,12 @@ def bridges_text(case: Case) -> str:
     """What is blue, and how often the bridges were recorded if not in every frame."""
     every = case.run.samples_per_cycle // case.run.samples_per_bridge_sample
     often = "once" if every == 1 else f"{every} times"
-    return EXPLAINED + (
+    return NECK_LEGEND + (
         f", recorded {often} per cycle" if case.run.samples_per_bridge_sample > 1 else ""
     )
 
 
-def ends_of(motion: Motion, place: FloatArray, contacts: IntArray) -> Ends:
+def bridge_ends(motion: Motion, place: FloatArray, contacts: IntArray) -> Ends:
     """Centres of the first beads of contacts, and of the second beads or the nearest points of walls, m, shape (K, 3).
 
     ``place`` are the centres of all beads relative to the boundary, m, shape (N, 3).
@@ -80,7 +80,7 @@ def at_front_walls(
     )
 
 
-def necks_of(
+def neck_surfaces(
     motion: Motion,
     contacts: IntArray,
     between: Ends,
@@ -88,7 +88,7 @@ def necks_of(
     sides: int,
     share: FloatArray | float = 1.0,
 ) -> Ends:
-    """Points and normals of the necks of contacts, mm, shape (K, rings × sides, 3), ``between`` their ends (`ends_of`).
+    """Points and normals of the necks of contacts, mm, shape (K, rings × sides, 3), ``between`` their ends (`bridge_ends`).
 
     ``share`` is the width that is drawn over the width of the neck.
     """
@@ -126,7 +126,7 @@ def necks_of(
     )
 
 
-def triangles_of(count: int, rings: int, sides: int) -> npt.NDArray[Any]:
+def neck_triangles(count: int, rings: int, sides: int) -> npt.NDArray[Any]:
     """Corners of the triangles of ``count`` necks, shape (T, 3), counterclockwise as seen from outside."""
     low, side = np.arange((rings - 1) * sides), np.arange((rings - 1) * sides) % sides
     beside = low - side + (side + 1) % sides

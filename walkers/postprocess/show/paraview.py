@@ -23,7 +23,7 @@ from walkers.postprocess.measure.clusters import connected
 from walkers.postprocess.measure.motion import Bridges, Motion, read_bridges, read_motion
 from walkers.postprocess.show.camera import camera_axes
 from walkers.postprocess.show.meshes import mesh_of, walls_of
-from walkers.postprocess.show.necks import ends_of
+from walkers.postprocess.show.necks import bridge_ends
 from walkers.postprocess.show.scene import Scene, gathered
 
 if TYPE_CHECKING:
@@ -161,7 +161,7 @@ def _bridges(motion: Motion, bridges: Bridges) -> meshio.Mesh:
     import meshio
 
     rows = bridges.rows()
-    begins, ends = ends_of(motion, motion.position[bridges.frame], bridges.contacts)
+    begins, ends = bridge_ends(motion, motion.position[bridges.frame], bridges.contacts)
     arrays = {
         **{name: rows[name] for name in ("bead_1", "bead_2", "wall")},
         **{"gap (m)": rows["gap"], "normal_force (N)": rows["normal_force"]},

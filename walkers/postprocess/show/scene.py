@@ -64,7 +64,7 @@ def gathered(motion: Motion, lane: float = 2.0) -> Motion:
     return moved if case.boundary.bare else moved.of_walkers(moved.walkers[:1])
 
 
-def turned_in(motion: Motion) -> FloatArray | None:
+def orientations_of(motion: Motion) -> FloatArray | None:
     """Orientations of the beads: quaternions (x, y, z, w) of the rotation since the first frame, shape (F, N, 4).
 
     The engine has no orientations of spheres; here its spins are integrated, dR/dt = [ω]× R. A bead turns by ω Δt about
@@ -107,7 +107,7 @@ class Scene:
 
     The rows of ``axes`` are unit vectors to the right in the picture, up, and toward the camera; ``low`` and ``high``
     are the limits of the view along them, mm. If ``shaken``, the view is in the laboratory, otherwise in the frame of
-    the boundary. ``rolling`` beads have two colours if their orientation is known. ``path`` is the displacement of the
+    the boundary. ``rolling`` beads have two colours if their orientation is known. ``camera_path`` is the displacement of the
     camera in each frame, mm, shape (F, 3); None for a camera at rest.
     """
 
@@ -117,7 +117,7 @@ class Scene:
     high: FloatArray
     shaken: bool = True
     rolling: bool = False
-    path: FloatArray | None = None
+    camera_path: FloatArray | None = None
 
     @classmethod
     def around(
@@ -130,13 +130,13 @@ class Scene:
     ) -> Scene:
         """A view of the beads in some frames, and of the width and the floor of a container.
 
-        ``share`` is the extent of the picture over that of the beads. Options are ``shaken``, ``rolling`` and ``path``,
+        ``share`` is the extent of the picture over that of the beads. Options are ``shaken``, ``rolling`` and ``camera_path``,
         with which the view does not include the container.
         """
         seen = motion.position[frames]
         if options.get("shaken", True):
             seen = seen + motion.substrate[frames, None]
-        if (path := options.get("path")) is not None:
+        if (path := options.get("camera_path")) is not None:
             seen = seen - 1e-3 * path[frames, None]
         seen, radius = 1e3 * seen @ axes.T, 1e3 * motion.radius[:, None]
         low, high = (seen - radius).min(axis=(0, 1)), (seen + radius).max(axis=(0, 1))
@@ -153,17 +153,19 @@ class Scene:
         options = {
             "shaken": self.shaken,
             "rolling": self.rolling,
-            "path": path_of(self.motion, frames.start or 0),
+            "camera_path": path_of(self.motion, frames.start or 0),
         }
         near = Scene.around(self.motion, self.axes, _ABOUT * share, frames, **options)
         return near if self.height(aspect) > _LONG * near.height(aspect) else self
 
-    def moved(self, frame: float) -> FloatArray:
+    def camera_displacement(self, frame: float) -> FloatArray:
         """Displacement of the camera in a frame, or between two (a fraction), mm."""
         number, share = int(frame), frame % 1.0
-        if self.path is None:
+        if self.camera_path is None:
             return np.zeros(3)
-        return (1.0 - share) * self.path[number] + share * self.path[number + ceil(share)]  # type: ignore[no-any-return]
+        return (1.0 - share) * self.camera_path[number] + share * self.camera_path[
+            number + ceil(share)
+        ]  # type: ignore[no-any-return]
 
     def height(self, aspect: float) -> float:
         """Height of the picture, mm, for a ratio of width to height."""
@@ -176,28 +178,28 @@ class Scene:
         return middle + distance * self.axes[2], middle, self.axes[1]
 
     @cached_property
-    def turned(self) -> FloatArray | None:
-        """Orientations of the beads (`turned_in`); None if not shown or unknown."""
-        return turned_in(self.motion) if self.rolling else None
+    def orientations(self) -> FloatArray | None:
+        """Orientations of the beads (`orientations_of`); None if not shown or unknown."""
+        return orientations_of(self.motion) if self.rolling else None
 
     @cached_property
-    def pointed_out(self) -> npt.NDArray[np.bool_]:
+    def highlighted(self) -> npt.NDArray[np.bool_]:
         """Highlighted beads in each frame: walkers and climbing clusters; shape (F, N)."""
         motion = self.motion
         chosen = np.tile(motion.walker_of >= 0, (len(motion.time), 1))
         return chosen | piles.tracks_of(motion)[1] if piles.applies(motion.case) else chosen
 
     @property
-    def explained(self) -> list[str]:
+    def colour_legend(self) -> list[str]:
         """What colours of beads mean, if that is not plain."""
-        return ["red: climbers"] if self.motion.case.loose and self.pointed_out.any() else []
+        return ["red: climbers"] if self.motion.case.loose and self.highlighted.any() else []
 
     def colours(self, chosen: npt.NDArray[np.bool_]) -> FloatArray:
         """Red, green, blue (to 255) of the dark and the pale lunes of beads, shape (2, N, 3); chosen ones in ruby."""
         large = self.motion.large
         packed = np.where(chosen, np.where(large, *RUBY), np.where(large, *GLASS))
         plain = (packed[:, None] >> np.array([16, 8, 0]) & 255).astype(np.float64)
-        if self.turned is None:
+        if self.orientations is None:
             return np.stack([plain, plain])
         darker = plain * np.minimum(1.0, _BRIGHTEST / plain.mean(axis=1, keepdims=True))
         return np.stack([darker, plain + _PALE * (255.0 - plain)])

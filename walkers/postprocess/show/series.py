@@ -25,7 +25,7 @@ from walkers.postprocess.show.drawing import (
     save_figure,
     styled,
 )
-from walkers.postprocess.show.necks import EXPLAINED, bridges_at
+from walkers.postprocess.show.necks import NECK_LEGEND, bridges_at
 from walkers.postprocess.show.scene import Scene, gathered, motion_in_view
 from walkers.postprocess.show.window import Window
 
@@ -129,13 +129,13 @@ def _figure(motion: Motion, frames: Sequence[int], *, follow: bool) -> Figure:
     heading = [
         case.title or case.name,
         *([tilted] if tilted else []),
-        ", ".join([*scene.explained, EXPLAINED]),
+        ", ".join([*scene.colour_legend, NECK_LEGEND]),
     ]
-    if scene.path is not None:
+    if scene.camera_path is not None:
         toward, direction = named_direction(motion)
         names = ("", "")
         titles = [
-            f"{time}\n{scene.moved(frame) @ toward:z.1f} mm"
+            f"{time}\n{scene.camera_displacement(frame) @ toward:z.1f} mm"
             for time, frame in zip(titles, frames, strict=True)
         ]
         heading.insert(-1, f"the view follows the beads: time and displacement {direction}")

@@ -13,13 +13,13 @@ from walkers.arrays import FloatArray, IntArray
 from walkers.postprocess.measure.motion import between, visible_displacement
 from walkers.postprocess.show.meshes import beach_ball, floor_lines, mesh_of, round_below, walls_of
 from walkers.postprocess.show.necks import (
-    BLUE,
+    NECK_COLOUR,
+    NECK_OPACITY,
     NO_BRIDGES,
-    OPACITY,
     at_front_walls,
-    ends_of,
-    necks_of,
-    triangles_of,
+    bridge_ends,
+    neck_surfaces,
+    neck_triangles,
 )
 from walkers.postprocess.show.scene import Scene, rotations_at
 
@@ -87,7 +87,7 @@ class Window:
             "culling": "back",
             "interpolation": "Phong",
         }
-        liquid = pv.Property(color=f"#{BLUE:06x}", opacity=OPACITY, **look)
+        liquid = pv.Property(color=f"#{NECK_COLOUR:06x}", opacity=NECK_OPACITY, **look)
         self._necks = pv.Actor(mapper=pv.DataSetMapper(), prop=liquid)
         self._necks.mapper.scalar_visibility = False
         self._plotter.add_actor(self._necks, reset_camera=False, render=False)
@@ -100,14 +100,14 @@ class Window:
         from PIL import Image
 
         motion, shift, number = self._scene.motion, np.zeros(3), int(frame)
-        place, share, turned = motion.position[number], frame - number, self._scene.turned
+        place, share, turned = motion.position[number], frame - number, self._scene.orientations
         if share:
             place = between(motion.select(slice(number, number + 2)), share)[0]
         if self._scene.shaken:
             time = np.interp([frame], np.arange(len(motion.time)), motion.time)
             shift = 1e3 * visible_displacement(motion.case.excitation, time)[0]
         self._beads.colour(
-            self._scene.colours(self._scene.pointed_out[number])[self._pale].swapaxes(0, 1)
+            self._scene.colours(self._scene.highlighted[number])[self._pale].swapaxes(0, 1)
         )
         self._beads.move(
             1e3 * place + shift, None if turned is None else rotations_at(turned, frame)
@@ -117,7 +117,7 @@ class Window:
         self._wet(place, bridges, shift)
         for actor in self._around:
             actor.position = tuple(shift)
-        moved = self._scene.moved(frame)
+        moved = self._scene.camera_displacement(frame)
         self._plotter.camera.SetPosition(
             self._place + moved
         )  # pyvista's own also looks for the limits of the scene
@@ -137,17 +137,17 @@ class Window:
         import pyvista as pv
 
         motion = self._scene.motion
-        begins, ends = ends_of(motion, place, bridges)
+        begins, ends = bridge_ends(motion, place, bridges)
         before = at_front_walls(motion, bridges, (begins, ends), self._scene.axes[2])
         contacts, between = bridges[~before], (begins[~before], ends[~before])
         self._necks.visibility = bool(len(contacts))
         if not len(contacts):
             return
         points, normals = (
-            array.reshape(-1, 3) for array in necks_of(motion, contacts, between, *self._round)
+            array.reshape(-1, 3) for array in neck_surfaces(motion, contacts, between, *self._round)
         )
         necks = pv.PolyData.from_regular_faces(
-            points + shift, triangles_of(len(contacts), *self._round)
+            points + shift, neck_triangles(len(contacts), *self._round)
         )
         necks.point_data["Normals"] = normals
         necks.point_data.active_normals_name = "Normals"
@@ -157,7 +157,7 @@ class Window:
         """Lines that make the motion of a floor visible, which is as bright as the background."""
         import pyvista as pv
 
-        path = np.zeros((1, 3)) if self._scene.path is None else self._scene.path
+        path = np.zeros((1, 3)) if self._scene.camera_path is None else self._scene.camera_path
         half, middle = _BEYOND * wide / 2.0, self._middle * [1.0, 1.0, 0.0]
         low, high = middle + path.min(axis=0) - half, middle + path.max(axis=0) + half
         lines = pv.line_segments_from_points(floor_lines(low, high, round_below(wide / 8.0)))
@@ -176,9 +176,11 @@ class Window:
             self._plotter.add_mesh(walls, color=_WALL, lighting=False, culling="back"),
             self._plotter.add_mesh(edges, color=_EDGE, line_width=3, lighting=False),
         ]
-        if self._scene.path is not None:
+        if self._scene.camera_path is not None:
             marks = self._marks(
-                faces, int(np.argmax(np.ptp(self._scene.path, axis=0))), round_below(wide / 8.0)
+                faces,
+                int(np.argmax(np.ptp(self._scene.camera_path, axis=0))),
+                round_below(wide / 8.0),
             )
             parts.append(self._plotter.add_mesh(marks, color=_LINES, line_width=3, lighting=False))
         return parts

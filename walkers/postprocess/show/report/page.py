@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _PACKAGE = "walkers.postprocess.show.report"
-NAME = "report.html"
-LARGEST = 5_000_000
+REPORT_NAME = "report.html"
+LARGEST_REPORT = 5_000_000
 """Largest size of a report in bytes, small enough for mail."""
 
 

@@ -1,7 +1,7 @@
 """Interactive 3-D player of the beads of a run: a K3D plot for reports and notebooks.
 
 Lengths are in mm, in the frame of the boundary; the view follows a walker with a long path. Two-coloured balls show how
-beads roll, unless the frames are too far apart (`walkers.postprocess.show.scene.turned_in`).
+beads roll, unless the frames are too far apart (`walkers.postprocess.show.scene.orientations_of`).
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from walkers.postprocess.measure.motion import Motion
 from walkers.postprocess.show.camera import against_gravity, axes_toward, camera_axes, from_the_side
 from walkers.postprocess.show.meshes import beach_ball, floor_lines, mesh_of, round_below, walls_of
 from walkers.postprocess.show.necks import (
-    BLUE,
-    OPACITY,
+    NECK_COLOUR,
+    NECK_OPACITY,
     at_front_walls,
+    bridge_ends,
     bridges_at,
     bridges_text,
-    ends_of,
-    necks_of,
-    triangles_of,
+    neck_surfaces,
+    neck_triangles,
 )
 from walkers.postprocess.show.scene import Scene, gathered
 
@@ -60,14 +60,14 @@ def player_of(
     scene = Scene.around(
         motion, camera_axes(motion), _AROUND, shaken=False, rolling=True
     ).following(_ASPECT, _AROUND)
-    shown, path = motion.select(slice(None, None, stride)), scene.path
+    shown, path = motion.select(slice(None, None, stride)), scene.camera_path
     bridges = bridges_at(motion, np.arange(0, len(motion.time), stride))
     captions.append(f"{bridges_text(motion.case).capitalize()}.")
     if path is not None:
         path = path[::stride]
         shown = replace(shown, position=shown.position - 1e-3 * path[:, None])
         captions.append("The view follows the beads.")
-    colours = scene.colours(np.any(scene.pointed_out[::stride], axis=0)).round() @ [
+    colours = scene.colours(np.any(scene.highlighted[::stride], axis=0)).round() @ [
         0x10000,
         0x100,
         1,
@@ -85,13 +85,13 @@ def player_of(
         camera_auto_fit=False,
         **look,
     )
-    if scene.turned is None:
+    if scene.orientations is None:
         captions.append(
             "The rolling of the beads is not shown: the frames are too far apart in time."
         )
         beads = [_points(shown, colours[0])]
     else:
-        beads = _balls(shown, scene.turned[::stride], colours)
+        beads = _balls(shown, scene.orientations[::stride], colours)
     boundary = _walls(motion, round_below(scene.height(_ASPECT) / 5.0))
     if path is not None:
         back = np.tile(np.eye(4), (len(path), 1, 1))
@@ -109,7 +109,7 @@ def player_of(
         *_necks(shown, motion.position[::stride], bridges, path, toward),
     ]:
         plot += part
-    plot.fps_meter, plot.camera = False, camera_of(motion, scene.path)
+    plot.fps_meter, plot.camera = False, camera_of(motion, scene.camera_path)
     # K3D's own player plays the run in 12 s.
     plot.time, end = ends = shown.time[[0, -1]].tolist()
     plot.time_speed = (end - plot.time) / 12.0 or 1.0
@@ -122,7 +122,7 @@ def camera_of(motion: Motion, path: FloatArray | None = None) -> list[float]:
     ``path`` is subtracted from the positions of the beads (`walkers.postprocess.show.scene.Scene`).
     """
     axes = _axes_of_camera(motion)
-    seen = Scene.around(motion, axes, _AROUND, shaken=False, path=path)
+    seen = Scene.around(motion, axes, _AROUND, shaken=False, camera_path=path)
     distance = (
         seen.height(_ASPECT) / 2.0 / tan(radians(_VIEW / 2.0))
         + float(seen.high[2] - seen.low[2]) / 2.0
@@ -216,16 +216,16 @@ def _necks(
     points = np.zeros((len(bridges), len(contacts) * fine[0] * fine[1], 3))
     for frame, present in enumerate(bridged):
         near = np.flatnonzero(bridged[max(frame - 1, 0) : frame + 2].any(axis=0))
-        ends = ends_of(motion, place[frame], contacts[near])
+        ends = bridge_ends(motion, place[frame], contacts[near])
         hidden = at_front_walls(motion, contacts[near], ends, toward)
         width = (present[near] & ~hidden).astype(float)
-        necks = necks_of(motion, contacts[near], ends, *fine, width)[0]
+        necks = neck_surfaces(motion, contacts[near], ends, *fine, width)[0]
         points[frame].reshape(len(contacts), -1, 3)[near] = necks - (
             0.0 if path is None else path[frame]
         )
-    look = {"color": BLUE, "opacity": OPACITY, "flat_shading": True, "name": "bridges"}
+    look = {"color": NECK_COLOUR, "opacity": NECK_OPACITY, "flat_shading": True, "name": "bridges"}
     mesh = k3d.mesh(
-        points[0].astype(np.float32), triangles_of(len(contacts), *fine).astype(np.uint32), **look
+        points[0].astype(np.float32), neck_triangles(len(contacts), *fine).astype(np.uint32), **look
     )
     mesh.vertices = _series(motion, np.round(points / _GRID) * _GRID)
     return [mesh]

@@ -24,7 +24,14 @@ from walkers.postprocess.measure.results import (
 )
 from walkers.postprocess.measure.uncertainty import fixed_values, fixed_values_text
 from walkers.postprocess.show.figures import figures_of
-from walkers.postprocess.show.report.page import LARGEST, NAME, check_report, fill, page_of, svg_of
+from walkers.postprocess.show.report.page import (
+    LARGEST_REPORT,
+    REPORT_NAME,
+    check_report,
+    fill,
+    page_of,
+    svg_of,
+)
 from walkers.postprocess.show.report.player import MOST_PLACES, player_of
 from walkers.runner.manifest import read_manifest
 from walkers.runner.run_directory import case_of
@@ -42,7 +49,7 @@ def report_run(
     origins: Origins = None,
     *,
     figures: Mapping[str, Figure] = {},
-    largest: int = LARGEST,
+    largest: int = LARGEST_REPORT,
 ) -> Path:
     """Write the report of a run as a self-contained HTML file, by default ``report.html`` in the run directory.
 
@@ -52,7 +59,7 @@ def report_run(
     `walkers.postprocess.measure.dump.DumpError` if a dump cannot be read.
     """
     require("report")
-    path = to or directory / NAME
+    path = to or directory / REPORT_NAME
     check_report(path)
     results, motion = read_results(directory, origins), read_motion(directory)
     title = motion.case.title or motion.case.name
