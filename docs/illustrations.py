@@ -271,7 +271,8 @@ def _make_validation(out: Path, docs: Path) -> None:
 def _benchmarks() -> Figure:
     """Published points and the curves of the second engine, without those of the second material of test 4."""
     panels = {key: panel for key, panel in published().items() if not key.startswith("alloy-")}
-    figure, grid = new_figure(TWO_COLUMNS, 11.0, nrows=4, ncols=2)
+    figure = new_figure(TWO_COLUMNS, 11.0)
+    grid = figure.subplots(nrows=4, ncols=2)
     for axes, (key, panel) in zip(grid.flat, panels.items(), strict=True):
         for series, marker in zip(panel["series"], "osD^"[: len(panel["series"])], strict=True):
             axes.plot(*series["points"].T, marker, mfc="none", ms=4.0, label=series["name"])
@@ -294,7 +295,8 @@ def _make_others(_: Path, docs: Path) -> None:
 @styled
 def _experiments(bench: Bench) -> Figure:
     """Drift by two tones against phase and strength, and restitution on a wet plate against 1/St."""
-    figure, (phases, strengths, impacts) = new_figure(TWO_COLUMNS, 3.2, ncols=3)
+    figure = new_figure(TWO_COLUMNS, 3.2)
+    phases, strengths, impacts = figure.subplots(ncols=3)
     at, fine = experiments.PHASES, np.arange(0.0, 181.0, 10.0)
     drifts = np.array([experiments.slider(bench, phase) for phase in at])
     curves = np.array([experiments.modelled(phase) for phase in fine])

@@ -65,7 +65,8 @@ def fig1b(sources: Sources) -> Figure:
     along = (float(centre[:, 0].min()) - 2.4 * largest, float(centre[:, 0].max()) + 2.4 * largest)
     half, origin = 1.15 * largest, float(centre[0, 0])
     row = 0.97 * ONE_COLUMN * 2.0 * half / (along[1] - along[0]) + 0.22
-    figure, axes = new_figure(ONE_COLUMN, len(frames) * row + 0.75, nrows=len(frames), sharex=True)
+    figure = new_figure(ONE_COLUMN, len(frames) * row + 0.75)
+    axes = figure.subplots(nrows=len(frames), sharex=True)
     motion = trajectory.motion.of_walkers(trajectory.walkers[:1])
     view = axes_toward(np.array([0.0, 0.0, 1.0]), trajectory.across_axis)
     pixels = 120.0 / float(trajectory.radii.min())
@@ -109,7 +110,8 @@ def fig2_threshold(sources: Sources) -> Figure:
     frequencies, low, high, theory, ramp, within = (
         thresholds_with_theory(sources).to_numpy(dtype=float).T
     )
-    figure, axes = new_figure(ONE_COLUMN, 2.8)
+    figure = new_figure(ONE_COLUMN, 2.8)
+    axes = figure.subplots()
     label = "engine: runs from rest, rest below, motion above"
     axes.errorbar(
         frequencies, (low + high) / 2.0, (high - low) / 2.0, fmt="o", mfc="none", label=label
@@ -133,7 +135,8 @@ def fig2_threshold(sources: Sources) -> Figure:
 def fig4(sources: Sources) -> Figure:
     """Velocity and rotation of the beads over two cycles: the large bead rolls, or rolls and slides."""
     table = sources.finished("fig4")
-    figure, axes = new_figure(TWO_COLUMNS, 4.0, ncols=2)
+    figure = new_figure(TWO_COLUMNS, 4.0)
+    axes = figure.subplots(ncols=2)
     for panel, letter, liquid in zip(axes, "ab", ("Si AK5", "Si AK10"), strict=True):
         for _, row in table[table["liquid.name"] == liquid].iterrows():
             trajectory = sources.trajectory(row["run"])

@@ -235,7 +235,8 @@ def draw_facts(outcome: Outcome) -> Figure:
     held out, from 5 to 95 %.
     """
     facts = outcome.calibration.file.observations
-    figure, axes = new_figure(TWO_COLUMNS, 0.25 * len(facts) + 1.5)
+    figure = new_figure(TWO_COLUMNS, 0.25 * len(facts) + 1.5)
+    axes = figure.subplots()
     heights = np.arange(len(facts))[::-1]
     axes.axvspan(-1.0, 1.0, color="0.9", lw=0)
     for index, (name, numbers) in enumerate(outcome.numbers.items()):

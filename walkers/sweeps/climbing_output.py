@@ -185,9 +185,8 @@ def climbs_figure(climbs: Sequence[Mapping[str, Any]]) -> Figure:
     """
     heights = [1.0, 0.3 + len(climbs) / 6.0]
     mosaic = [["survival", "climbs"], ["rates", "rates"]]
-    figure, axes = new_figure(
-        TWO_COLUMNS, _ROW_HEIGHT * sum(heights), mosaic=mosaic, height_ratios=heights
-    )
+    figure = new_figure(TWO_COLUMNS, _ROW_HEIGHT * sum(heights))
+    axes = figure.subplot_mosaic(mosaic, height_ratios=heights)
     _draw_survival(axes["survival"], climbs[0]["curve"])
     _draw_speeds(axes["climbs"], climbs[0]["each"])
     _draw_rates(axes["rates"], climbing_table(climbs))

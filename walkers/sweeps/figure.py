@@ -260,9 +260,8 @@ def _empty_grid(number: int, *, share_x: bool) -> tuple[Figure, npt.NDArray[Any]
     height = _ONE_PANEL
     if number > 1:
         height = 6.0 / columns * rows + 0.9
-    figure, grid = new_figure(
-        TWO_COLUMNS, height, nrows=rows, ncols=columns, squeeze=False, sharey=True, sharex=share_x
-    )
+    figure = new_figure(TWO_COLUMNS, height)
+    grid = figure.subplots(rows, columns, sharex=share_x, sharey=True, squeeze=False)
     for axes in grid.flat[number:]:
         axes.set_axis_off()
     return figure, grid

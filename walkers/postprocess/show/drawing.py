@@ -1,4 +1,8 @@
-"""Common parts of figures: style, widths, letters, legends, and files with metadata."""
+"""What all figures share: style, widths, letters of panels, legends, and files with metadata.
+
+What a figure shows is decided elsewhere: of runs in `walkers.postprocess.show.figures`, of sweeps
+in `walkers.sweeps.figure`.
+"""
 
 from __future__ import annotations
 
@@ -19,88 +23,121 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
 
-ONE_COLUMN, TWO_COLUMNS = 3.4, 7.0
-"""Widths of figures in one and in two columns of a journal, inches."""
+ONE_COLUMN = 3.4
+"""Width of a figure in one column of a journal, inches."""
+TWO_COLUMNS = 7.0
+"""Width of a figure in two columns of a journal, inches."""
 FORMATS = ("png", "svg", "pdf")
 """Formats of figures."""
 _STYLE = Path(__file__).parent / "style.mplstyle"
-_MAKER = "granular-walkers"
-_LEAST_ERROR = 0.02  # about half of the height of a symbol, over the range of values
-_Given = ParamSpec("_Given")
-_Drawn = TypeVar("_Drawn")
+_SOFTWARE = "granular-walkers"
+"""Name of the program in the metadata of figures."""
+_LEAST_ERROR = 0.02
+"""Half of the height of a symbol over the height of its axes, approximately."""
+_BELOW_AXES = 30.0
+"""Distance of a legend below its axes, points: space for tick labels and the label of x."""
+_POINTS_PER_INCH = 72.0
+_Arguments = ParamSpec("_Arguments")
+_Result = TypeVar("_Result")
 
 
-def styled(draw: Callable[_Given, _Drawn]) -> Callable[_Given, _Drawn]:
+def styled(draw: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]:
     """Decorator: draw in the style of the project and restore the settings of the caller."""
 
     @wraps(draw)
-    def drawn(*given: _Given.args, **options: _Given.kwargs) -> _Drawn:
+    def draw_in_style(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
         import matplotlib.style
 
         with matplotlib.style.context(_STYLE):
-            return draw(*given, **options)
+            return draw(*args, **kwargs)
 
-    return drawn
+    return draw_in_style
 
 
 def plain_text(text: str) -> str:
     """A text of the user for matplotlib: without formulas and control characters."""
-    return "\n".join(map(printable, text.split("\n"))).replace("$", r"\$")
+    lines = [printable(line) for line in text.split("\n")]
+    return "\n".join(lines).replace("$", r"\$")
 
 
-def new_figure(
-    width: float, height: float, *, mosaic: Any = None, **options: Any
-) -> tuple[Figure, Any]:
-    """A figure (size in inches) and its axes without the global state of pyplot, for `styled` functions.
+def new_figure(width: float, height: float) -> Figure:
+    """A figure without axes (width and height in inches), for `styled` functions.
 
-    Options are those of `matplotlib.figure.Figure.subplots`, or with a ``mosaic`` those of ``subplot_mosaic``.
+    It does not touch the global state of pyplot, and its layout is constrained.
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.subplots(**options) if mosaic is None else figure.subplot_mosaic(
-        mosaic, **options
-    )
+    return Figure(figsize=(width, height), layout="constrained")
 
 
 def letter_panels(panels: Iterable[Axes]) -> None:
-    """Put (a), (b), … before the titles of panels, aligned to the left."""
+    """Put (a), (b), … before the titles of panels, and align the titles to the left."""
     for panel, letter in zip(panels, ascii_lowercase, strict=False):
-        title, size = panel.get_title(), panel.title.get_fontsize()
+        title = panel.get_title()
+        size = panel.title.get_fontsize()
         panel.set_title("")
         panel.set_title(f"({letter}) {title}".rstrip(), loc="left", fontsize=size)
 
 
 def errors_seen(errors: Any, values: Any) -> bool:
-    """Whether error bars exceed the symbols, if the values fill the axes."""
-    finite, shown = np.asarray(errors)[np.isfinite(errors)], np.asarray(values)[np.isfinite(values)]
-    return bool(len(finite) and finite.max() > _LEAST_ERROR * np.ptp(shown))
+    """Whether error bars are longer than symbols are high, if the values fill the axes.
+
+    Parameters
+    ----------
+    errors, values : array_like
+        Half lengths of the error bars, and the values that the axes show, in the same unit. What is
+        not finite is ignored.
+    """
+    finite_errors = np.asarray(errors)[np.isfinite(errors)]
+    finite_values = np.asarray(values)[np.isfinite(values)]
+    if not len(finite_errors):
+        return False
+    return bool(finite_errors.max() > _LEAST_ERROR * np.ptp(finite_values))
 
 
-def legend_below(axes: Axes, **options: Any) -> Legend:
-    """A legend below axes of a figure with constrained layout, below tick labels and the label of the abscissa."""
+def legend_below(axes: Axes, *, ncols: int = 1, title: str | None = None) -> Legend:
+    """Add a legend below axes of a figure with constrained layout, clear of the labels of x.
+
+    Parameters
+    ----------
+    axes
+        The axes, whose labelled lines the legend names.
+    ncols
+        Number of columns of the legend.
+    title
+        Title of the legend.
+
+    Returns
+    -------
+    Legend
+        The legend.
+    """
     from matplotlib.transforms import ScaledTranslation
 
-    down = ScaledTranslation(0.0, -30.0 / 72.0, axes.figure.dpi_scale_trans)
-    options |= {
-        "bbox_to_anchor": (0.5, 0.0),
-        "bbox_transform": axes.transAxes + down,
-        "borderaxespad": 0.0,
-    }
-    return axes.legend(loc="upper center", **options)
+    down = ScaledTranslation(0.0, -_BELOW_AXES / _POINTS_PER_INCH, axes.figure.dpi_scale_trans)
+    return axes.legend(
+        loc="upper center",
+        bbox_to_anchor=(0.5, 0.0),
+        bbox_transform=axes.transAxes + down,
+        borderaxespad=0.0,
+        ncols=ncols,
+        title=title,
+    )
 
 
 def check_formats(formats: str | Sequence[str]) -> list[str]:
-    """Formats as a list; they may be joined by commas. Raises `InputError` for any that is not in `FORMATS`."""
-    given = [
-        form
-        for text in ([formats] if isinstance(formats, str) else formats)
-        for form in text.split(",")
-    ]
-    for form in given:
-        if form not in FORMATS:
-            raise input_error("format", f"{form!r}: expected one of {', '.join(FORMATS)}")
-    return list(dict.fromkeys(given))
+    """Formats as a list without repetitions; commas may join several in one text.
+
+    Raises `InputError` for a format that is not in `FORMATS`.
+    """
+    texts = [formats] if isinstance(formats, str) else formats
+    names: list[str] = []
+    for text in texts:
+        names += text.split(",")
+    for name in names:
+        if name not in FORMATS:
+            raise input_error("format", f"{name!r}: expected one of {', '.join(FORMATS)}")
+    return list(dict.fromkeys(names))
 
 
 def check_place(path: Path, *suffixes: str) -> None:
@@ -116,30 +153,55 @@ def save_figure(
     formats: str | Sequence[str] = ("png",),
     title: str = "",
 ) -> list[Path]:
-    """Write a figure beside its final place and rename it; each of the formats (`FORMATS`) replaces the suffix.
+    """Write a figure in some formats; each file is written beside its place and renamed.
 
-    Its metadata name the ``sources``, run directories, which end in the hash of case and engine, and a title.
+    Parameters
+    ----------
+    figure
+        The figure; afterwards its layout is fixed.
+    path
+        The file; each format replaces its suffix. Missing folders are made.
+    sources
+        Run directories for the metadata. Their names end in the hash of case and engine.
+    formats
+        Some of `FORMATS`.
+    title
+        Title for the metadata; by default the name of the file.
+
+    Returns
+    -------
+    list of Path
+        The files, one for each format.
+
+    Raises
+    ------
+    InputError
+        If a format is not in `FORMATS`.
     """
     formats = check_formats(formats)
     path.parent.mkdir(parents=True, exist_ok=True)
-    name, runs = printable(title or path.stem), " ".join(dict.fromkeys(sources))
-    # Without dates equal figures are equal files. PDF has no field for the source.
-    metadata: dict[str, dict[str, str | None]] = {
-        "png": {"Title": name, "Source": runs, "Software": _MAKER},
-        "svg": {"Title": name, "Source": runs, "Creator": _MAKER, "Date": None},
-        "pdf": {
-            "Title": name,
-            "Subject": f"Source: {runs}",
-            "Creator": _MAKER,
+    metadata = _metadata(printable(title or path.stem), " ".join(dict.fromkeys(sources)))
+    # All formats have one layout: a new one would start from the last and give another result.
+    styled(figure.draw_without_rendering)()
+    figure.set_layout_engine("none")
+    written = []
+    for name in formats:
+        place = path.with_suffix(f".{name}")
+        with beside(place) as new:
+            styled(figure.savefig)(new, format=name, metadata=metadata[name])
+        written.append(place)
+    return written
+
+
+def _metadata(title: str, sources: str) -> dict[str, dict[str, str | None]]:
+    """Metadata of a figure by format: without dates, so that equal figures are equal files."""
+    return {
+        "png": {"Title": title, "Source": sources, "Software": _SOFTWARE},
+        "svg": {"Title": title, "Source": sources, "Creator": _SOFTWARE, "Date": None},
+        "pdf": {  # has no field for the source
+            "Title": title,
+            "Subject": f"Source: {sources}",
+            "Creator": _SOFTWARE,
             "CreationDate": None,
         },
     }
-    # One layout for all formats: each further one would begin with the last and give another result.
-    styled(figure.draw_without_rendering)()
-    figure.set_layout_engine("none")
-    written = [path.with_suffix(f".{form}") for form in formats]
-    for place in written:
-        form = place.suffix[1:]
-        with replacing(place) as new:
-            styled(figure.savefig)(new, format=form, metadata=metadata[form])
-    return written

@@ -189,9 +189,8 @@ def _panels(
 ) -> tuple[Figure, list[Axes]]:
     """A figure of `FIGURES`, whose titles have the words, with panels one below the other and no legends."""
     heights = [panel.height for panel in FIGURES[name]]
-    figure, grid = new_figure(
-        TWO_COLUMNS, sum(heights), nrows=len(heights), height_ratios=heights, squeeze=False
-    )
+    figure = new_figure(TWO_COLUMNS, sum(heights))
+    grid = figure.subplots(nrows=len(heights), height_ratios=heights, squeeze=False)
     panels = list(grid[:, 0])
     for axes, panel, look in zip(panels, FIGURES[name], looks, strict=True):
         _draw(axes, panel._replace(title=panel.title.format(**words)), tables[panel.table], look)

@@ -170,9 +170,8 @@ def _drawn(
     width = columns * (inches * wide + _BESIDE) + 0.8
     lines = [line for text in heading for line in wrap(plain_text(text), round(13.0 * width))]
     height = rows * (inches * tall + _BENEATH) + _LINE * len(lines)
-    figure, axes = new_figure(
-        width, height, nrows=rows, ncols=columns, squeeze=False, sharex=True, sharey=True
-    )
+    figure = new_figure(width, height)
+    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     figure.set_layout_engine("compressed")
     figure.suptitle("\n".join(lines), fontsize=10)
     extent = np.stack([scene.low, scene.high], axis=1)[:2].ravel().tolist()
