@@ -296,7 +296,9 @@ def archive(
 @pytest.fixture(scope="session", autouse=True)
 def small_pictures() -> None:
     """Views of a quarter of the width and height: a processor takes long to draw them."""
-    series._TALL, series._TALLEST, series._WIDEST = 250, 400, 475  # type: ignore[misc]
+    series._USUAL_HEIGHT = 250  # type: ignore[misc]
+    series._LARGEST_HEIGHT = 400  # type: ignore[misc]
+    series._LARGEST_WIDTH = 475  # type: ignore[misc]
 
 
 @pytest.fixture

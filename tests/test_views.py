@@ -42,7 +42,7 @@ from walkers.postprocess.show.meshes import mesh_of, walls_of
 from walkers.postprocess.show.necks import NO_BRIDGES, bridge_ends, bridges_at, neck_surfaces
 from walkers.postprocess.show.paraview import _walls, write_vtk
 from walkers.postprocess.show.scene import Scene, gathered
-from walkers.postprocess.show.series import _figure
+from walkers.postprocess.show.series import _series_figure
 from walkers.postprocess.show.window import Window
 
 
@@ -313,7 +313,7 @@ def test_axes_of_a_picture_say_which_way_is_uphill(
     tilt: float, labels: list[str], motion: Motion
 ) -> None:
     on_slope = replace(motion, case=motion.case.with_value_at("boundary.tilt", tilt))
-    (axes,) = _figure(on_slope, [0], follow=False).axes
+    (axes,) = _series_figure(on_slope, [0], follow=False).axes
     assert [axes.get_xlabel(), axes.get_ylabel()] == labels
 
 

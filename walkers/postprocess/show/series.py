@@ -1,12 +1,15 @@
-"""Pictures of a run at several times: containers from the side, planes and trays along their normal.
+"""Pictures of a run at several times, drawn side by side as one figure.
 
-On a tilted plane up in the picture is uphill. The view follows a walker that walks far.
+Containers are seen from the side, planes and trays along their normal; on a tilted plane, up in the
+picture is uphill. The view follows a walker that walks far. Films are made in
+`walkers.postprocess.show.films`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 from textwrap import wrap
@@ -30,22 +33,53 @@ from walkers.postprocess.show.scene import Scene, gathered, motion_in_view
 from walkers.postprocess.show.window import Window
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SERIES_NAME, PICTURE_NAME = "series.png", "walker.png"
-"""Pictures of all beads, and of one walker."""
+SERIES_NAME = "series.png"
+"""Name of the pictures of all beads."""
+PICTURE_NAME = "walker.png"
+"""Name of the pictures of one walker."""
 MOST_PICTURES = 6
-"""Pictures in a time series."""
-_PIXELS = 40.0
-"""Smallest resolution of a view in pixels per mm, unless it becomes too large."""
-_TALL, _TALLEST, _WIDEST = 1000, 1600, 1900
-"""Pixels of a view: usual height, largest height (views that are much higher than wide), largest width."""
-_PAGE, _VIEW = (8.0, 10.0), (1.4, 5.0)
-"""Largest width and height of all views; width or height of a view, which gives the larger one; inches."""
-_BESIDE, _BENEATH, _LINE = 0.25, 0.75, 0.2
-"""Space beside and beneath a view; height of a line of text; inches."""
-_AROUND, _ASPECT = 1.1, 6.0
-"""Extent of a view from above over that of the beads; largest width over height of a view that does not follow."""
+"""Largest number of pictures unless the user gives another."""
+
+# --- resolution of a view, pixels ---
+_LEAST_RESOLUTION = 40.0
+"""Smallest resolution, pixels per mm, unless the view becomes too large."""
+_USUAL_HEIGHT = 1000
+"""Height of a view, pixels."""
+_LARGEST_HEIGHT = 1600
+"""Largest height of a view, pixels, which views of tall containers need."""
+_LARGEST_WIDTH = 1900
+"""Largest width of a view, pixels."""
+
+# --- sizes on paper, inches ---
+_PAGE_WIDTH = 8.0
+"""Largest width of all views with the space beside them, inches."""
+_PAGE_HEIGHT = 10.0
+"""Largest height of all views with the space below them, inches."""
+_VIEW_WIDTH = 1.4
+"""Width of a view, inches, unless `_VIEW_HEIGHT` makes it larger or the page smaller."""
+_VIEW_HEIGHT = 5.0
+"""Height of a view, inches, unless `_VIEW_WIDTH` makes it larger or the page smaller."""
+_SPACE_BESIDE = 0.25
+"""Space beside a view, inches."""
+_SPACE_BELOW = 0.75
+"""Space below a view, inches: tick labels, and the title of the next view."""
+_SPACE_OF_LABELS = 0.8
+"""Space of the labels at the left of all views, inches."""
+_LINE_HEIGHT = 0.2
+"""Height of a line of the heading, inches."""
+_LETTERS_PER_INCH = 13.0
+"""Letters of the heading per inch of the width of the figure."""
+_FIGURE_MARGIN = 0.15
+"""Space around the finished figure, inches, both sides together."""
+
+# --- the view ---
+_EXTENT_FROM_ABOVE = 1.1
+"""Extent of a view from above over the extent of the beads."""
+_LARGEST_ASPECT = 6.0
+"""Largest width over height of a view that does not follow the beads."""
 
 
 @styled
@@ -56,146 +90,261 @@ def render_series(
     images: int = MOST_PICTURES,
     walker: int | None = None,
 ) -> list[Path]:
-    """Render views of a run in rows, with times and scales; walkers, climbers and liquid bridges are coloured.
+    """Render views of a run in rows, with times and scales.
 
-    `InputError` if the destination is no PNG, or the run has no walker with this number.
+    Walkers, climbers and liquid bridges are coloured.
 
     Parameters
     ----------
-    directory, destination
-        A run directory; the PNG, if None ``series.png``, of one walker ``walker.png``, in it.
+    directory
+        A run directory.
+    destination
+        The PNG; None: ``series.png``, or ``walker.png`` of one walker, in the run directory.
     images
-        Largest number of pictures, evenly spaced through the drive; fewer if the last is then closer to its end.
+        Largest number of pictures, from 1 to 20, evenly spaced through the drive; fewer if the last
+        picture is then closer to the end of the drive.
     walker
-        Number of a walker to show by itself; None: the first of independent walkers, otherwise all beads.
+        Number of a walker to show by itself; None: the first of independent walkers, otherwise all
+        beads.
+
+    Returns
+    -------
+    list of Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the destination is no PNG, ``images`` is out of its range, or the run has no walker with
+        this number.
     """
     check_limits("images", images, 1, 20)
     if destination is not None:
         check_place(destination, ".png")
-    motion, single = motion_in_view(read_motion(directory), walker)
-    path = destination or directory / (PICTURE_NAME if single else SERIES_NAME)
-    figure = _figure(
-        gathered(motion) if single else motion, even_frames(motion, images), follow=single
-    )
+    motion, is_single = motion_in_view(read_motion(directory), walker)
+    frames = even_frames(motion, images)
+    if is_single:
+        path = destination or directory / PICTURE_NAME
+        motion = gathered(motion)
+    else:
+        path = destination or directory / SERIES_NAME
+    figure = _series_figure(motion, frames, follow=is_single)
     return save_figure(figure, path, [directory.name])
 
 
 def even_frames(motion: Motion, count: int) -> list[int]:
-    """Evenly spaced frames from the first of the drive: ``count``, or fewer if the last is then closer to the end.
+    """Evenly spaced frames from the first frame of the drive.
 
-    If there are enough cycles, all have the same phase; otherwise walkers would appear to move backward.
+    If there are enough cycles, all frames have the same phase; otherwise walkers would appear to
+    move backward.
+
+    Parameters
+    ----------
+    motion
+        The motion.
+    count
+        Number of frames; there are fewer if the last one is then closer to the end.
     """
-    start, cycle = motion.first_driven, motion.case.run.samples_per_cycle
+    start = motion.first_driven
     last = len(motion.time) - 1 - start
-    every, steps = (cycle, last // cycle) if last // cycle >= count - 1 else (1, last)
-    if not (most := min(count - 1, steps)):
-        return [start]
-    step = min(
-        steps // most, -(-steps // most), key=lambda step: steps - step * min(most, steps // step)
-    )
-    return [start + every * step * number for number in range(min(most, steps // step) + 1)]
+    unit = 1
+    if last // motion.case.run.samples_per_cycle >= count - 1:
+        unit = motion.case.run.samples_per_cycle
+    steps, step = _even_steps(last // unit, count - 1)
+    return [start + unit * step * number for number in range(steps + 1)]
+
+
+def _even_steps(length: int, most: int) -> tuple[int, int]:
+    """Number and size of the equal steps, at most ``most``, that cover the most of a length."""
+    most = min(most, length)
+    if most == 0:
+        return 0, 0
+    shorter = length // most
+    longer = ceil(length / most)
+    steps_of_longer = min(most, length // longer)
+    if longer * steps_of_longer > shorter * most:
+        return steps_of_longer, longer
+    return most, shorter
 
 
 def even_labels(time: FloatArray) -> list[str]:
     """Evenly spaced times (s) as text with the required number of decimals."""
-    between = float(time[-1] - time[0]) / max(len(time) - 1, 1)
-    decimals = next(
-        (
-            places
-            for places in range(2, 6)
-            if abs(round(between, places) - between) <= 0.01 * between
-        ),
-        6,
-    )
+    interval = float(time[-1] - time[0]) / max(len(time) - 1, 1)
+    decimals = 2
+    while decimals < 6 and abs(round(interval, decimals) - interval) > 0.01 * interval:
+        decimals += 1
     return [f"{moment:.{decimals}f} s" for moment in time]
 
 
-def _figure(motion: Motion, frames: Sequence[int], *, follow: bool) -> Figure:
-    """Pictures of frames with axes in mm; those of one walker in a column, or in a row if it goes up."""
-    case, sideways, driven = (
-        motion.case,
-        from_the_side(motion.case),
-        slice(motion.first_driven, None),
-    )
-    axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    axes = axes if sideways else plan_axes(motion, np.array([1.0, 0.0, 0.0]))
-    around = 1.0 if sideways else _AROUND
-    scene = Scene.around(motion, axes, around, driven, shaken=False)
-    scene = scene.following(_ASPECT, around, driven) if follow else scene
-    titles, tilted = even_labels(motion.time[frames]), case.boundary.tilted
-    names = (
-        ("x", "height") if sideways else ("across the slope", "uphill") if tilted else ("x", "y")
-    )
-    heading = [
-        case.title or case.name,
-        *([tilted] if tilted else []),
-        ", ".join([*scene.colour_legend, NECK_LEGEND]),
-    ]
-    if scene.camera_path is not None:
-        toward, direction = named_direction(motion)
-        names = ("", "")
-        titles = [
-            f"{time}\n{scene.camera_displacement(frame) @ toward:z.1f} mm"
-            for time, frame in zip(titles, frames, strict=True)
-        ]
-        heading.insert(-1, f"the view follows the beads: time and displacement {direction}")
-    columns = (
-        (1 if np.ptp([scene.low, scene.high], axis=0)[:2].argmax() == 0 else len(frames))
-        if follow
-        else 0
-    )
-    return _drawn(
-        scene, frames, titles, [f"{name} (mm)".lstrip() for name in names], heading, columns
-    )
+@dataclass(frozen=True)
+class _Labels:
+    """Texts of a series: lines above it, the title of each view, and labels of the axes."""
+
+    heading: list[str]
+    titles: list[str]
+    x: str
+    y: str
 
 
-def _drawn(
-    scene: Scene,
-    frames: Sequence[int],
-    titles: Sequence[str],
-    labels: Sequence[str],
-    heading: Sequence[str],
-    columns: int,
-) -> Figure:
-    """Pictures of frames in a number of columns; 0: that which makes them largest."""
-    count, (wide, tall) = len(frames), (scene.high - scene.low)[:2].tolist()
+@dataclass(frozen=True)
+class _Layout:
+    """Views of one size (mm) in rows and columns.
 
-    def scale(columns: int) -> float:
-        """Inches per mm."""
-        across, up = _PAGE[0] / columns - _BESIDE, _PAGE[1] / ceil(count / columns) - _BENEATH
-        return float(min(max(_VIEW[0] / wide, _VIEW[1] / tall), across / wide, up / tall))
+    Attributes
+    ----------
+    count
+        Number of views.
+    columns
+        Number of columns.
+    width, height
+        Extent of a view, mm.
+    """
 
-    columns = columns or max(range(1, count + 1), key=lambda number: (scale(number), number))
-    rows, inches = ceil(count / columns), scale(columns)
-    width = columns * (inches * wide + _BESIDE) + 0.8
-    lines = [line for text in heading for line in wrap(plain_text(text), round(13.0 * width))]
-    height = rows * (inches * tall + _BENEATH) + _LINE * len(lines)
-    figure = new_figure(width, height)
-    axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+    count: int
+    columns: int
+    width: float
+    height: float
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return ceil(self.count / self.columns)
+
+    @property
+    def scale(self) -> float:
+        """Scale of the views, inches per mm."""
+        usual = max(_VIEW_WIDTH / self.width, _VIEW_HEIGHT / self.height)
+        free_width = _PAGE_WIDTH / self.columns - _SPACE_BESIDE
+        free_height = _PAGE_HEIGHT / self.rows - _SPACE_BELOW
+        return min(usual, free_width / self.width, free_height / self.height)
+
+    @property
+    def figure_width(self) -> float:
+        """Width of the figure, inches."""
+        return self.columns * (self.scale * self.width + _SPACE_BESIDE) + _SPACE_OF_LABELS
+
+    @property
+    def views_height(self) -> float:
+        """Height of all views, inches."""
+        return self.rows * (self.scale * self.height + _SPACE_BELOW)
+
+    @property
+    def view_pixels(self) -> tuple[int, int]:
+        """Width and height of a view in pixels."""
+        per_mm = min(_LEAST_RESOLUTION, _LARGEST_HEIGHT / self.height)
+        per_mm = max(per_mm, _USUAL_HEIGHT / self.height)
+        per_mm = min(per_mm, _LARGEST_WIDTH / self.width)
+        return max(1, round(self.width * per_mm)), max(1, round(self.height * per_mm))
+
+    def is_left(self, number: int) -> bool:
+        """Whether a view is in the first column."""
+        return number % self.columns == 0
+
+    def is_lowest(self, number: int) -> bool:
+        """Whether a view has no other view below it."""
+        return number + self.columns >= self.count
+
+
+def _series_figure(motion: Motion, frames: Sequence[int], *, follow: bool) -> Figure:
+    """Pictures of frames with axes in mm; the view may ``follow`` the beads."""
+    scene = _scene_of(motion, follow=follow)
+    width, height = (scene.high - scene.low)[:2].tolist()
+    if not follow:
+        layout = _largest_layout(len(frames), width, height)
+    elif width >= height:
+        layout = _Layout(len(frames), 1, width, height)
+    else:
+        layout = _Layout(len(frames), len(frames), width, height)
+    return _draw(scene, frames, _labels_of(scene, frames), layout)
+
+
+def _scene_of(motion: Motion, *, follow: bool) -> Scene:
+    """The view of a series: from the side with z up, or along the normal of the floor."""
+    if from_the_side(motion.case):
+        axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+        extent_factor = 1.0
+    else:
+        axes = plan_axes(motion, np.array([1.0, 0.0, 0.0]))
+        extent_factor = _EXTENT_FROM_ABOVE
+    driven = slice(motion.first_driven, None)
+    scene = Scene.around(motion, axes, extent_factor, driven, shaken=False)
+    if follow:
+        scene = scene.following(_LARGEST_ASPECT, extent_factor, driven)
+    return scene
+
+
+def _largest_layout(count: int, width: float, height: float) -> _Layout:
+    """The number of columns with which views (width and height in mm) are largest."""
+    layouts = [_Layout(count, columns, width, height) for columns in range(1, count + 1)]
+    return max(layouts, key=lambda layout: (layout.scale, layout.columns))
+
+
+def _labels_of(scene: Scene, frames: Sequence[int]) -> _Labels:
+    """Texts of the views of frames; if the view follows the beads, with their displacement."""
+    case = scene.motion.case
+    heading = [case.title or case.name]
+    if case.boundary.tilted:
+        heading.append(case.boundary.tilted)
+    titles = even_labels(scene.motion.time[frames])
+    if scene.camera_path is None:
+        x, y = _axis_labels(scene.motion)
+    else:
+        x = y = "(mm)"
+        toward, direction = named_direction(scene.motion)
+        heading.append(f"the view follows the beads: time and displacement {direction}")
+        for number, frame in enumerate(frames):
+            titles[number] += f"\n{scene.camera_displacement(frame) @ toward:z.1f} mm"
+    heading.append(", ".join([*scene.colour_legend, NECK_LEGEND]))
+    return _Labels(heading, titles, x, y)
+
+
+def _axis_labels(motion: Motion) -> tuple[str, str]:
+    """Labels of the axes of a view that is at rest."""
+    if from_the_side(motion.case):
+        return "x (mm)", "height (mm)"
+    if motion.case.boundary.tilted:
+        return "across the slope (mm)", "uphill (mm)"
+    return "x (mm)", "y (mm)"
+
+
+def _draw(scene: Scene, frames: Sequence[int], labels: _Labels, layout: _Layout) -> Figure:
+    """Render the frames of a scene, and draw them into the panels of a figure."""
+    heading: list[str] = []
+    for text in labels.heading:
+        heading += wrap(plain_text(text), round(_LETTERS_PER_INCH * layout.figure_width))
+    height = layout.views_height + _LINE_HEIGHT * len(heading)
+    figure = new_figure(layout.figure_width, height)
+    panels = figure.subplots(layout.rows, layout.columns, sharex=True, sharey=True, squeeze=False)
     figure.set_layout_engine("compressed")
-    figure.suptitle("\n".join(lines), fontsize=10)
+    figure.suptitle("\n".join(heading), fontsize=10)
     extent = np.stack([scene.low, scene.high], axis=1)[:2].ravel().tolist()
-    pixels = min(max(_TALL / tall, min(_PIXELS, _TALLEST / tall)), _WIDEST / wide)
-    size = [max(1, round(length * pixels)) for length in (wide, tall)]
-    seen = zip(axes.flat, frames, bridges_at(scene.motion, frames), titles, strict=False)
-    with closing(Window(scene, size)) as window:
-        for number, (panel, frame, bridges, title) in enumerate(seen):
-            panel.imshow(window.picture(frame, bridges), extent=extent, interpolation="antialiased")
-            panel.set_title(title, fontsize=10)
-            panel.grid(visible=False)
-            panel.spines["right"].set_visible(
-                from_the_side(scene.motion.case)
-            )  # as the left one, a wall
-            below, left = number + columns >= count, not number % columns
-            panel.tick_params(
-                left=left, labelleft=left, bottom=below, labelbottom=below, labelsize=9
-            )
-            panel.set_xlabel(labels[0] if below else "", fontsize=10)
-            panel.set_ylabel(labels[1] if left else "", fontsize=10)
-            panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])
-    for panel in axes.flat[count:]:
+    bridges = bridges_at(scene.motion, frames)
+    with closing(Window(scene, layout.view_pixels)) as window:
+        for number, frame in enumerate(frames):
+            panel = panels.flat[number]
+            picture = window.picture(frame, bridges[number])
+            panel.imshow(picture, extent=extent, interpolation="antialiased")
+            panel.set_title(labels.titles[number], fontsize=10)
+            panel.spines["right"].set_visible(from_the_side(scene.motion.case))  # a wall
+            left_label = labels.y if layout.is_left(number) else None
+            lower_label = labels.x if layout.is_lowest(number) else None
+            _draw_scales(panel, left_label, lower_label)
+    for panel in panels.flat[len(frames) :]:
         panel.remove()
     figure.draw_without_rendering()
     box = figure.get_tightbbox()
-    figure.set_size_inches(box.width + 0.15, box.height + 0.15)
+    figure.set_size_inches(box.width + _FIGURE_MARGIN, box.height + _FIGURE_MARGIN)
     return figure
+
+
+def _draw_scales(panel: Axes, left_label: str | None, lower_label: str | None) -> None:
+    """Draw the scales of a view at its left and below it; None: no scale on that side."""
+    has_left = left_label is not None
+    has_lower = lower_label is not None
+    panel.grid(visible=False)
+    panel.tick_params(
+        left=has_left, labelleft=has_left, bottom=has_lower, labelbottom=has_lower, labelsize=9
+    )
+    panel.set_xlabel(lower_label or "", fontsize=10)
+    panel.set_ylabel(left_label or "", fontsize=10)
+    panel.locator_params(axis="x", nbins=4, steps=[1, 2, 5, 10])
