@@ -1,17 +1,24 @@
-"""Figures of runs, drawn by names of columns: walks, gaits, paths on trays, climbs."""
+"""Figures of one run, drawn from the columns of its tables: walks, gaits, paths on trays, climbs.
+
+`FIGURES` lists their panels by names of columns; labels and units are those of the quantities. The
+figures of sweeps are in `walkers.sweeps.figure`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
+from dataclasses import dataclass
+from itertools import pairwise, product
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray, IntArray
 from walkers.errors import input_error
+from walkers.inputs.tables.bodies import Walkers
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.caption import caption
 from walkers.postprocess.measure.motion import LEAST_SAMPLES
@@ -36,69 +43,147 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Tables = Callable[[str], Columns]
+"""The tables of a run: their columns by the name of the table."""
+Look = dict[str, Any]
+"""The look of a line: keyword arguments of `matplotlib.axes.Axes.plot`."""
 
-class Panel(NamedTuple):
-    """A plot: table, x, y (several columns; ``rotation_*``: of all beads), column of the lines, title, inches high."""
+
+@dataclass(frozen=True)
+class Panel:
+    """A plot of columns of a table.
+
+    Attributes
+    ----------
+    table
+        Name of the table.
+    x
+        Column of the abscissa.
+    y
+        Columns of the ordinate; ``rotation_*`` stands for the rotations of all beads.
+    title
+        The title; words in braces are filled in by the function that draws the figure.
+    lines
+        Column with a value for each line; empty if each column is one line.
+    height
+        Height, inches.
+    """
 
     table: str
     x: str
-    y: str
-    by: str
+    y: tuple[str, ...]
     title: str
+    lines: str = ""
     height: float = 1.6
 
 
-_ROLLS = "Walker {number}; a bead rolls without sliding where its curve coincides with the walker's"
-_TRAY = "Paths seen from above; circles: start; beads at the end, to scale"
 FIGURES: Mapping[str, Sequence[Panel]] = {
     "walk": (
-        Panel("cycles", "time", "distance", "walker", "Distance {direction}; grey: settling"),
-        Panel("cycles", "time", "orientation", "walker", "Orientation from {reference}"),
-        Panel("cycles", "along", "across", "walker", "Paths of the centres of mass, {seen}"),
-    ),
-    "gait": (Panel("trajectory", "cycle", "velocity rotation_*", "", _ROLLS, 3.2),),
-    "paths": (Panel("trajectory", "x", "y", "walker", _TRAY),),
-    "climb": (
-        Panel("members", "time", "height", "track", "Clusters' leaders", 3.2),
         Panel(
-            "bed",
-            "time",
-            "brazil_nut brazil_nut_of_bulk",
-            "",
-            "Segregation: (z of large − z of small) / their sum",
+            table="cycles",
+            x="time",
+            y=("distance",),
+            lines="walker",
+            title="Distance {direction}; grey: settling",
         ),
-        Panel("bed", "time", "bridges contacts", "", "Bridges and contacts with other beads"),
+        Panel(
+            table="cycles",
+            x="time",
+            y=("orientation",),
+            lines="walker",
+            title="Orientation from {reference}",
+        ),
+        Panel(
+            table="cycles",
+            x="along",
+            y=("across",),
+            lines="walker",
+            title="Paths of the centres of mass, {seen}",
+        ),
+    ),
+    "gait": (
+        Panel(
+            table="trajectory",
+            x="cycle",
+            y=("velocity", "rotation_*"),
+            title=(
+                "Walker {number}; a bead rolls without sliding where its curve coincides "
+                "with the walker's"
+            ),
+            height=3.2,
+        ),
+    ),
+    "paths": (
+        Panel(
+            table="trajectory",
+            x="x",
+            y=("y",),
+            lines="walker",
+            title="Paths seen from above; circles: start; beads at the end, to scale",
+        ),
+    ),
+    "climb": (
+        Panel(
+            table="members",
+            x="time",
+            y=("height",),
+            lines="track",
+            title="Clusters' leaders",
+            height=3.2,
+        ),
+        Panel(
+            table="bed",
+            x="time",
+            y=("brazil_nut", "brazil_nut_of_bulk"),
+            title="Segregation: (z of large − z of small) / their sum",
+        ),
+        Panel(
+            table="bed",
+            x="time",
+            y=("bridges", "contacts"),
+            title="Bridges and contacts with other beads",
+        ),
     ),
 }
-MOST_NAMED = 12  # lines in a legend
-LEAST = {"m": 0.01, "rad": 0.1, "m/s": 0.01}
-"""Smallest ranges of axes by unit, in mm, ° and mm/s, so that rounding errors do not look like motion."""
-_LETTERS, _LETTERS_OF_AN_INCH = (
-    100,
-    13,
-)  # letters of a line of a title; of a y label per inch of its panel
-_ASIDE = 10.0  # smallest angle at the start (°) in a legend
-_BETWEEN, _BEFORE = (
-    10,
-    3,
-)  # points of a smooth curve between samples; samples before it, which give its slope
-_GREY, _PALE, _OTHERS = "#5b6770", "#b4bec5", "#8d99a1"
-_DASHES, _MARKERS = ("-", (0, (5, 1.5)), (0, (1, 1.2))), "os^Dv"
-_MARKS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
+"""The panels of each figure, from top to bottom."""
+MOST_NAMED = 12
+"""Largest number of lines in a legend."""
+_SMALLEST_RANGES = {"m": 0.01, "rad": 0.1, "m/s": 0.01}
+"""Smallest ranges of axes by the unit of the column, in the units of the axes: mm, ° and mm/s.
+Otherwise rounding errors would look like motion."""
+_TITLE_LETTERS = 100
+"""Letters of a line of the title."""
+_LABEL_LETTERS = 13
+"""Letters of a line of the label of y, per inch of the height of its panel."""
+_ASIDE = 10.0
+"""Smallest angle at the start that a legend names, degrees."""
+_INTERPOLATED = 10
+"""Points of a smooth curve per interval between samples."""
+_SAMPLES_BEFORE = 3
+"""Samples before a smooth curve, which give its slope at the start."""
+_GREY = "#5b6770"
+"""Colour of surfaces, edges, events and starts."""
+_PALE = "#b4bec5"
+"""Colour of lines behind others."""
+_NOT_CLIMBING = "#8d99a1"
+"""Colour of clusters that did not climb."""
+_DASHES = ("-", (0, (5, 1.5)), (0, (1, 1.2)))
+"""Styles of lines, which repeat."""
+_MARKERS = "os^Dv"
+"""Markers of lines, which repeat."""
+_EVENT_MARKERS = {"freed": "^", "split": "<", "merged": ">", "rejoined": "v", "detached": "x"}
 """Markers of the events of clusters."""
-Tables = Callable[[str], Columns]
 
 
 def figures_of(results: Results) -> dict[str, Figure]:
     """The figures of a run by the names of their files, drawn from its tables."""
-    case, tables = case_of(results.directory), results.columns
+    case = case_of(results.directory)
+    tables = results.columns
     figures = {}
     if case.walkers:
         figures["walk"] = walk_figure(case, tables)
-        if (
-            case.run.samples_per_cycle >= LEAST_SAMPLES
-            and tables("trajectory")["cycle"].max() >= 2.0
-        ):
+        resolves_cycles = case.run.samples_per_cycle >= LEAST_SAMPLES
+        if resolves_cycles and tables("trajectory")["cycle"].max() >= 2.0:
             figures["gait"] = gait_figure(case, tables)
     if case.meets:
         figures["paths"] = paths_figure(case, tables)
@@ -110,190 +195,300 @@ def figures_of(results: Results) -> dict[str, Figure]:
 def plot_run(
     directory: Path, destination: Path | None = None, formats: str | Sequence[str] = ("png",)
 ) -> list[Path]:
-    """Draw the figures of a run, ``walk``, ``gait``, ``paths`` or ``climb``, into a folder, by default that of the run.
+    """Draw the figures of a run, ``walk``, ``gait``, ``paths`` or ``climb``, into a folder.
 
-    `InputError` for formats that are not in `walkers.postprocess.show.drawing.FORMATS`, and for a
-    picture's name as folder.
+    Parameters
+    ----------
+    directory
+        A run directory.
+    destination
+        The folder; None: the run directory.
+    formats
+        Formats of the files, of `walkers.postprocess.show.drawing.FORMATS`; commas may join several
+        in one text.
+
+    Returns
+    -------
+    list of Path
+        The files, one for each figure and format.
+
+    Raises
+    ------
+    InputError
+        If a format does not exist, or the destination is the name of a picture.
     """
     formats = check_formats(formats)
     destination = destination or directory
     if destination.suffix.lower()[1:] in FORMATS and not destination.is_dir():
         raise input_error(destination, "expected a folder, because a run may have several figures")
     destination.mkdir(parents=True, exist_ok=True)
-    return [
-        path
-        for name, figure in figures_of(read_results(directory)).items()
-        for path in save_figure(figure, destination / name, [directory.name], formats)
-    ]
+    written: list[Path] = []
+    for name, figure in figures_of(read_results(directory)).items():
+        written += save_figure(figure, destination / name, [directory.name], formats)
+    return written
 
 
-def _draw(axes: Axes, panel: Panel, columns: Columns, looks: Sequence[Mapping[str, Any]]) -> None:
-    """Draw a panel: a line with its look for each column ``y`` and each value of ``by``."""
-    x_label, x_factor = axis(panel.table, panel.x)
-    names = [name for part in panel.y.split() for name in columns if matches(part, name)]
-    series = columns[panel.by] if panel.by else np.zeros(len(columns[panel.x]), dtype=np.int64)
-    lines = [(name, series == value) for name in names for value in np.unique(series)]
-    for (name, rows), look in zip(lines, looks, strict=True):
-        factor = axis(panel.table, name)[1]
-        given = {"label": declared(name, panel.table).label} if len(names) > 1 else {}
-        axes.plot(
-            x_factor * columns[panel.x][rows], factor * columns[name][rows], **{**given, **look}
-        )
-    axes.set(xlabel=x_label, title=panel.title)
-    axes.set_ylabel(
-        "\n".join(wrap(axis(panel.table, names[0])[0], round(_LETTERS_OF_AN_INCH * panel.height)))
-    )
-    for name, limits, widen in (
-        (panel.x, axes.dataLim.intervalx, axes.set_xlim),
-        (names[0], axes.dataLim.intervaly, axes.set_ylim),
-    ):
-        least = LEAST.get(declared(name, panel.table).unit, 0.0)
-        if np.isfinite(limits).all() and np.ptp(limits) < least:
-            widen(*(limits.mean() + np.array([-0.5, 0.5]) * least))
+def line_styles(labels: Sequence[str]) -> list[Look]:
+    """Looks of lines that differ with and without colours.
 
+    Markers of lines that coincide are beside each other. Lines beyond `MOST_NAMED` are grey; the
+    label of the first of them tells how many there are.
 
-def line_styles(labels: Sequence[str]) -> list[dict[str, Any]]:
-    """Looks of lines, told apart with and without colours; those beyond `MOST_NAMED` are grey, and say how many.
-
-    Markers of lines that coincide are beside each other.
+    Parameters
+    ----------
+    labels
+        The label of each line.
     """
-    looks: list[dict[str, Any]] = [
-        {
-            **{
-                "label": label,
-                "color": f"C{number}",
-                "linestyle": _DASHES[number % len(_DASHES)],
-                "linewidth": 0.9,
-            },
-            **{
-                "marker": _MARKERS[number % len(_MARKERS)],
-                "mfc": "none",
-                "markevery": (0.02 * (number % 6), 0.12),
-            },
+    looks: list[Look] = []
+    for number, label in enumerate(labels[:MOST_NAMED]):
+        look = {
+            "label": label,
+            "color": f"C{number}",
+            "linestyle": _DASHES[number % len(_DASHES)],
+            "linewidth": 0.9,
+            "marker": _MARKERS[number % len(_MARKERS)],
+            "mfc": "none",
+            "markevery": (0.02 * (number % 6), 0.12),
         }
-        for number, label in enumerate(labels[:MOST_NAMED])
-    ]
+        looks.append(look)
     more = len(labels) - len(looks)
-    grey = {"color": _PALE, "linewidth": 0.5, "zorder": 1.5, "rasterized": True}
-    return looks + [
-        grey | ({} if number else {"label": f"and {more} more"}) for number in range(more)
-    ]
+    for number in range(more):
+        look = {"color": _PALE, "linewidth": 0.5, "zorder": 1.5, "rasterized": True}
+        if number == 0:
+            look["label"] = f"and {more} more"
+        looks.append(look)
+    return looks
 
 
-def _panels(
+def _draw_panel(
+    axes: Axes, panel: Panel, title: str, columns: Columns, looks: Sequence[Look]
+) -> None:
+    """Draw a panel: a line, with its look, for each column of y and each value of ``lines``."""
+    names = _columns_of_y(panel, columns)
+    if panel.lines:
+        line_of_row = columns[panel.lines]
+    else:
+        line_of_row = np.zeros(len(columns[panel.x]), dtype=np.int64)
+    lines = np.unique(line_of_row)
+    x_label, x_factor = axis(panel.table, panel.x)
+    for (name, line), look in zip(product(names, lines), looks, strict=True):
+        _, y_factor = axis(panel.table, name)
+        rows = line_of_row == line
+        axes.plot(x_factor * columns[panel.x][rows], y_factor * columns[name][rows], **look)
+    y_label, _ = axis(panel.table, names[0])
+    axes.set(xlabel=x_label, title=title)
+    axes.set_ylabel("\n".join(wrap(y_label, round(_LABEL_LETTERS * panel.height))))
+    x_limits = _widened(axes.dataLim.intervalx, declared(panel.x, panel.table).unit)
+    if x_limits is not None:
+        axes.set_xlim(*x_limits)
+    y_limits = _widened(axes.dataLim.intervaly, declared(names[0], panel.table).unit)
+    if y_limits is not None:
+        axes.set_ylim(*y_limits)
+
+
+def _columns_of_y(panel: Panel, columns: Columns) -> list[str]:
+    """The names of the columns that a panel draws."""
+    names: list[str] = []
+    for pattern in panel.y:
+        names += [name for name in columns if matches(pattern, name)]
+    return names
+
+
+def _widened(limits: npt.NDArray[Any], unit: str) -> npt.NDArray[Any] | None:
+    """Limits of an axis that are as far apart as its unit needs; None if those given are."""
+    smallest = _SMALLEST_RANGES.get(unit, 0.0)
+    if not np.isfinite(limits).all() or np.ptp(limits) >= smallest:
+        return None
+    widened: npt.NDArray[Any] = limits.mean() + np.array([-0.5, 0.5]) * smallest
+    return widened
+
+
+def _draw_figure(
     name: str,
     case: Case,
     tables: Mapping[str, Columns],
-    looks: Sequence[Sequence[Mapping[str, Any]]],
-    **words: object,
+    looks: Sequence[Sequence[Look]],
+    words: Mapping[str, object],
 ) -> tuple[Figure, list[Axes]]:
-    """A figure of `FIGURES`, whose titles have the words, with panels one below the other and no legends."""
+    """Draw a figure of `FIGURES` without legends.
+
+    Parameters
+    ----------
+    name
+        Name of the figure.
+    case
+        The case, for the title.
+    tables
+        Columns by the names of their tables.
+    looks
+        The looks of the lines of each panel.
+    words
+        What stands in the titles of panels for the words in braces.
+
+    Returns
+    -------
+    figure
+        The figure.
+    panels
+        Its axes, one below the other.
+    """
     heights = [panel.height for panel in FIGURES[name]]
     figure = new_figure(TWO_COLUMNS, sum(heights))
     grid = figure.subplots(nrows=len(heights), height_ratios=heights, squeeze=False)
-    panels = list(grid[:, 0])
-    for axes, panel, look in zip(panels, FIGURES[name], looks, strict=True):
-        _draw(axes, panel._replace(title=panel.title.format(**words)), tables[panel.table], look)
+    panels: list[Axes] = list(grid[:, 0])
+    for axes, panel, panel_looks in zip(panels, FIGURES[name], looks, strict=True):
+        title = panel.title.format(**words)
+        _draw_panel(axes, panel, title, tables[panel.table], panel_looks)
     for upper, lower in pairwise(panels):
         if upper.get_xlabel() == lower.get_xlabel():
             upper.sharex(lower)
             upper.set_xlabel("")
             upper.tick_params(labelbottom=False)
-    title = [
-        line
-        for part in (case.title or case.name, *caption(case).split("; "))
-        for line in wrap(part, _LETTERS)
-    ]
-    figure.suptitle(plain_text("\n".join(title)))
+    title_lines: list[str] = []
+    for part in (case.title or case.name, *caption(case).split("; ")):
+        title_lines += wrap(part, _TITLE_LETTERS)
+    figure.suptitle(plain_text("\n".join(title_lines)))
     return figure, panels
 
 
-def _explained(figure: Figure, panels: Sequence[Axes], title: str = "") -> Figure:
-    """The figure with letters and a legend of the lines of its first panel."""
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right center", title=title)
-    letter_panels(panels if len(panels) > 1 else ())
+def _add_legend(figure: Figure, panels: Sequence[Axes], title: str = "") -> None:
+    """Add a legend of the lines of the first panel, and letters if there are several panels."""
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside right center", title=title)
+    if len(panels) > 1:
+        letter_panels(panels)
     figure.align_ylabels()
-    return figure
+
+
+@dataclass(frozen=True)
+class _Starts:
+    """How W walkers start.
+
+    Attributes
+    ----------
+    direction : ndarray of int, shape (W,)
+        1: in the positive direction of the drive axis, −1: opposite. Walkers that may meet have 1.
+    angle : ndarray, shape (W,)
+        Angle from this direction, rad.
+    turn : ndarray, shape (W,)
+        What the angles of the table exceed those from this direction by, rad: 0 or ±π.
+    """
+
+    direction: IntArray
+    angle: FloatArray
+    turn: FloatArray
+
+
+def _starts(case: Case, cycles: Columns, walkers: Columns) -> _Starts:
+    """How the walkers of the tables ``cycles`` and ``walkers`` start."""
+    angle = cycles["orientation"][cycles["cycle"] == 0]
+    facing = walkers["facing"]
+    direction = np.ones_like(facing) if case.meets else sides(facing, angle)
+    turn = np.where(direction == facing, 0.0, np.copysign(np.pi, angle))
+    return _Starts(direction, angle - turn, turn)
 
 
 @styled
 def walk_figure(case: Case, tables: Tables) -> Figure:
-    """Distance along the heading, on slopes uphill, orientation, and paths from above, of all walkers, once a cycle.
+    """Draw distance, orientation and path from above of all walkers, once a cycle.
 
-    Orientations are from the direction that the legend names; those of walkers that may meet are from the drive axis.
+    Distances are along the heading, on slopes uphill. Orientations are from the direction that the
+    legend names; those of walkers that may meet are from the drive axis.
     """
-    cycles, walkers, uphill = tables("cycles"), tables("walkers"), case.goes_uphill
-    start = cycles["orientation"][cycles["cycle"] == 0]
-    side = np.ones_like(walkers["facing"]) if case.meets else sides(walkers["facing"], start)
-    turned = np.where(side == walkers["facing"], 0.0, np.copysign(np.pi, start))
-    cycles = cycles | {
-        "orientation": cycles["orientation"]
-        - np.repeat(turned, len(cycles["cycle"]) // len(turned))
+    uphill = case.goes_uphill
+    walkers = tables("walkers")
+    cycles = dict(tables("cycles"))
+    starts = _starts(case, cycles, walkers)
+    samples = len(cycles["cycle"]) // len(starts.turn)
+    cycles["orientation"] = cycles["orientation"] - np.repeat(starts.turn, samples)
+    looks = line_styles(_walk_labels(case, walkers, starts))
+    words = {
+        "direction": "along the heading",
+        "reference": "the direction that the legend names",
+        "seen": "seen from above",
     }
-    labels = []
-    for row in np.argsort(walkers["walker"]):
-        degrees, side_way = (
-            np.degrees(start - turned)[row],
-            direction_names(uphill=uphill)[int(side[row] < 0)],
-        )
-        aside = f"{side_way} at {degrees:.0f}°" if abs(degrees) > _ASIDE else side_way
-        velocity = rounded(1e3 * walkers["axial_velocity" if uphill else "velocity"][row], "mm/s")
-        labels.append(
-            f"{walkers['walker'][row]}: {f'{degrees:.0f}°' if case.meets else aside}, {velocity} mm/s"
-        )
-    direction = "uphill" if uphill else "along the heading"
     if uphill:
-        names = {"distance": "along", "along": "across", "across": "along"}
-        cycles |= {name: cycles[column] for name, column in names.items()}
-    reference = "the drive axis" if case.meets else "the direction that the legend names"
-    seen = (
-        f"{case.boundary.tilted}, seen along its normal"
-        if case.boundary.tilted
-        else "seen from above"
-    )
-    words = {"direction": direction, "reference": reference, "seen": seen}
-    figure, panels = _panels("walk", case, {"cycles": cycles}, [line_styles(labels)] * 3, **words)
-    settled = cycles["time"][case.for_cycles(int(cycles["cycle"].max())).run.settled_strobes]
-    for axes in panels[:2]:
+        words["direction"] = "uphill"
+        along, across = cycles["along"], cycles["across"]
+        cycles |= {"distance": along, "along": across, "across": along}
+    if case.meets:
+        words["reference"] = "the drive axis"
+    if case.boundary.tilted:
+        words["seen"] = f"{case.boundary.tilted}, seen along its normal"
+    figure, panels = _draw_figure("walk", case, {"cycles": cycles}, [looks] * 3, words)
+    distance, orientation, paths = panels
+    measured = case.for_cycles(int(cycles["cycle"].max()))
+    settled = cycles["time"][measured.run.settled_strobes]
+    for axes in (distance, orientation):
         axes.axvspan(0.0, float(settled), color="0.93", zorder=0)
     if uphill:
-        panels[2].invert_xaxis()  # what is on the left is on the left of who goes up
-        panels[2].set(xlabel="across the slope, to the left (mm)", ylabel="uphill (mm)")
-        panels[0].set_ylabel("uphill (mm)")
+        paths.invert_xaxis()  # what is on the left is on the left of who goes up
+        paths.set(xlabel="across the slope, to the left (mm)", ylabel="uphill (mm)")
+        distance.set_ylabel("uphill (mm)")
     start_word = "angle" if case.meets else "facing"
-    return _explained(figure, panels, f"walker: {start_word} at the start,\nvelocity {direction}")
+    title = f"walker: {start_word} at the start,\nvelocity {words['direction']}"
+    _add_legend(figure, panels, title)
+    return figure
+
+
+def _walk_labels(case: Case, walkers: Columns, starts: _Starts) -> list[str]:
+    """Labels of walkers in the order of their numbers: start and mean velocity."""
+    uphill = case.goes_uphill
+    velocities = walkers["axial_velocity" if uphill else "velocity"]
+    degrees = np.degrees(starts.angle)
+    labels = []
+    for row in np.argsort(walkers["walker"]):
+        angle = f"{degrees[row]:.0f}°"
+        forward, backward = direction_names(uphill=uphill)
+        start = backward if starts.direction[row] < 0 else forward
+        if case.meets:
+            start = angle
+        elif abs(degrees[row]) > _ASIDE:
+            start += f" at {angle}"
+        velocity = rounded(1e3 * velocities[row], "mm/s")
+        labels.append(f"{walkers['walker'][row]}: {start}, {velocity} mm/s")
+    return labels
 
 
 @styled
 def gait_figure(case: Case, tables: Tables) -> Figure:
-    """Velocities of the first walker and of its beads in the last two cycles (Fig. 4 of Khan et al.), smooth."""
-    trajectory, walkers = tables("trajectory"), tables("walkers")
+    """Draw velocities of the first walker and of its beads in the last two cycles, smoothed.
+
+    As Fig. 4 of Khan et al.
+    """
+    trajectory = tables("trajectory")
+    walkers = tables("walkers")
     number = walkers["walker"][0]
-    last = np.flatnonzero(trajectory["walker"] == number)[
-        -2 * case.run.samples_per_cycle - 1 - _BEFORE :
-    ]
-    names = ["velocity", *(name for name in trajectory if matches("rotation_*", name))]
+    samples = 2 * case.run.samples_per_cycle + 1 + _SAMPLES_BEFORE
+    last = np.flatnonzero(trajectory["walker"] == number)[-samples:]
+    names = ["velocity"]
+    names += [name for name in trajectory if matches("rotation_*", name)]
     names = [name for name in names if np.isfinite(trajectory[name][last]).all()]
     smooth = _smooth({name: trajectory[name][last] for name in ("cycle", *names)}, "cycle")
-    widths, colours = np.linspace(6.0, 1.1, len(names)), [_PALE, *(f"C{n}" for n in range(1, 99))]
-    looks = [
-        {"color": colour, "linewidth": width}
-        for colour, width in zip(colours, widths, strict=False)
-    ]
-    for look, name in zip(looks, names, strict=True):
-        label, mean = declared(name, "trajectory").label, rounded(1e3 * walkers[name][0], "mm/s")
-        look["label"] = f"{label}\n(mean of the run {mean} mm/s)"
-    figure, (axes,) = _panels("gait", case, {"trajectory": smooth}, [looks], number=number)
+    looks: list[Look] = []
+    widths = np.linspace(6.0, 1.1, len(names))
+    for line, name in enumerate(names):
+        label = declared(name, "trajectory").label
+        mean = rounded(1e3 * walkers[name][0], "mm/s")
+        look = {
+            "color": f"C{line}" if line else _PALE,
+            "linewidth": widths[line],
+            "label": f"{label}\n(mean of the run {mean} mm/s)",
+        }
+        looks.append(look)
+    words = {"number": number}
+    figure, (axes,) = _draw_figure("gait", case, {"trajectory": smooth}, [looks], words)
     axes.axhline(0.0, color="0.4", lw=0.6)
     axes.set_ylabel("velocity relative to the substrate;\nbeads: −R dφ/dt (mm/s)")
     axes.set_xlim(smooth["cycle"][-1] - 2.0, smooth["cycle"][-1] + 0.02)
-    return _explained(figure, [axes])
+    _add_legend(figure, [axes])
+    return figure
 
 
 def _smooth(columns: Columns, x: str) -> Columns:
     """Columns at more places between samples, by cubic interpolation that does not overshoot."""
     places = columns[x]
-    parts = np.arange(_BETWEEN * (len(places) - 1) + 1) / _BETWEEN
+    parts = np.arange(_INTERPOLATED * (len(places) - 1) + 1) / _INTERPOLATED
     dense = np.interp(parts, np.arange(len(places)), places)
     return {name: _interpolated(places, values, dense) for name, values in columns.items()}
 
@@ -303,9 +498,9 @@ def _interpolated(
 ) -> npt.NDArray[Any]:
     """Values at dense places, by Akima's modified cubic interpolation.
 
-    This is ``scipy.interpolate.Akima1DInterpolator(places, values, method="makima")(dense)``, without half a second
-    for the import. The slope at a sample is a mean of the slopes of the intervals around it, weighted by how much the
-    slopes change on the other side.
+    This is ``scipy.interpolate.Akima1DInterpolator(places, values, method="makima")(dense)``,
+    without half a second for the import. The slope at a sample is a mean of the slopes of the
+    intervals around it, weighted by how much the slopes change on the other side.
 
     Parameters
     ----------
@@ -327,18 +522,19 @@ def _interpolated(
     slopes[-2] = 2.0 * slopes[-3] - slopes[-4]
     slopes[-1] = 2.0 * slopes[-2] - slopes[-3]
     changes = np.abs(np.diff(slopes)) + 0.5 * np.abs(slopes[1:] + slopes[:-1])
-    before, after = (
-        changes[2:],
-        changes[:-2],
-    )  # weights of the interval before a sample, and of that after it
+    before = changes[2:]  # weight of the interval before a sample
+    after = changes[:-2]  # weight of the interval after a sample
     weights = before + after
     mean = 0.5 * (slopes[3:] + slopes[:-3])  # where all slopes around a sample are zero
     is_curved = weights > 1e-9 * weights.max(initial=-np.inf)
     weighted = before * slopes[1:-2] + after * slopes[2:-1]
     tangents = np.where(is_curved, weighted / np.where(is_curved, weights, 1.0), mean)
     interval = np.clip(np.searchsorted(places, dense, side="right") - 1, 0, len(steps) - 1)
-    step, start = steps[interval], values[interval]
-    slope, first, second = slopes[2:-2][interval], tangents[:-1][interval], tangents[1:][interval]
+    step = steps[interval]
+    start = values[interval]
+    slope = slopes[2:-2][interval]
+    first = tangents[:-1][interval]
+    second = tangents[1:][interval]
     offset = dense - places[interval]
     cubic = (first + second - 2.0 * slope) / step**2
     square = (3.0 * slope - 2.0 * first - second) / step
@@ -348,94 +544,106 @@ def _interpolated(
 
 @styled
 def paths_figure(case: Case, tables: Tables) -> Figure:
-    """Paths of walkers that may meet, once per cycle, with their beads at the end and the edge of the floor."""
-    from matplotlib.patches import Circle
-
-    trajectory, walkers = tables("trajectory"), tables("walkers")
-    x, y, angle = (
-        trajectory[name].reshape(len(walkers["walker"]), -1) for name in ("x", "y", "orientation")
-    )
+    """Draw paths of walkers that may meet, once per cycle, their beads at the end, and the edge."""
+    trajectory = tables("trajectory")
+    walkers = tables("walkers")
+    count = len(walkers["walker"])
+    x = trajectory["x"].reshape(count, -1)
+    y = trajectory["y"].reshape(count, -1)
+    angle = trajectory["orientation"].reshape(count, -1)
     strobe = slice(None, None, case.run.samples_per_cycle)
-    columns = {"walker": np.repeat(walkers["walker"], x[:, strobe].shape[1])}
-    columns |= {"x": x[:, strobe].ravel(), "y": y[:, strobe].ravel()}
-    looks = [
-        look | {"marker": "", "linestyle": "-"}
-        for look in line_styles([f"walker {n}" for n in range(len(x))])
-    ]
-    reach = 2.0 * max(kind.length for kind in case.walkers)
-    height = 0.7 * TWO_COLUMNS * min(1.2, max(0.3, (np.ptp(y) + reach) / (np.ptp(x) + reach)))
-    figure, (axes,) = _panels("paths", case, {"trajectory": columns}, [looks])
-    figure.set_figheight(0.9 + height)
+    columns = {
+        "walker": np.repeat(walkers["walker"], x[:, strobe].shape[1]),
+        "x": x[:, strobe].ravel(),
+        "y": y[:, strobe].ravel(),
+    }
+    looks = line_styles([f"walker {number}" for number in range(count)])
+    for look in looks:
+        look |= {"marker": "", "linestyle": "-"}
+    figure, (axes,) = _draw_figure("paths", case, {"trajectory": columns}, [looks], {})
+    margin = 2.0 * max(kind.length for kind in case.walkers)
+    aspect = (np.ptp(y) + margin) / (np.ptp(x) + margin)
+    figure.set_figheight(0.9 + 0.7 * TWO_COLUMNS * min(1.2, max(0.3, aspect)))
     axes.plot(1e3 * x[:, 0], 1e3 * y[:, 0], "o", color=_GREY, mfc="none", ms=2.5, mew=0.6)
-    drive, across = np.array(case.drive_axis), np.cross([0.0, 0.0, 1.0], case.drive_axis)
-    for row, kind in enumerate(case.walkers[number] for number in walkers["make"]):
-        place, weights = np.array(kind.design), np.array(kind.radii) ** 3
-        place = walkers["facing"][row] * (place - weights @ place / weights.sum())
-        turn = np.array(
-            [
-                [np.cos(angle[row, -1]), np.sin(angle[row, -1])],
-                [-np.sin(angle[row, -1]), np.cos(angle[row, -1])],
-            ]
-        )
-        beads = place @ turn @ np.array([drive, across])[:, :2] + [x[row, -1], y[row, -1]]
-        for bead, radius in zip(beads, kind.radii, strict=True):
-            colour = looks[walkers["walker"][row]]["color"]
-            axes.add_patch(Circle(1e3 * bead, 1e3 * radius, fc=colour, ec="none", alpha=0.5))
+    for row, number in enumerate(walkers["walker"]):
+        kind = case.walkers[walkers["make"][row]]
+        centre = [x[row, -1], y[row, -1]]
+        places = _bead_places(case, kind, walkers["facing"][row], angle[row, -1]) + centre
+        _draw_beads(axes, places, kind.radii, looks[number]["color"])
     if case.boundary.closed:
-        edge = np.linspace(-0.55, 0.55, 221) * case.boundary.inner_width
-        places = np.stack(np.meshgrid(edge, edge, case.boundary.inner_height / 2.0), axis=-1)[
-            :, :, 0
-        ]
-        inside = case.boundary.geometry.side_clearance(places.reshape(-1, 3)).reshape(
-            places.shape[:2]
-        )
-        axes.contour(1e3 * edge, 1e3 * edge, inside, levels=[0.0], colors=[_GREY], linewidths=1.0)
+        _draw_edge(axes, case)
     axes.set_aspect("equal")
     axes.margins(0.08)
-    return _explained(figure, [axes])
+    _add_legend(figure, [axes])
+    return figure
+
+
+def _bead_places(case: Case, kind: Walkers, facing: int, angle: float) -> FloatArray:
+    """Centres of the beads of a walker relative to its centre of mass, seen from above, m.
+
+    Parameters
+    ----------
+    case
+        The case, which gives the drive axis.
+    kind
+        The kind of walker, of n beads.
+    facing
+        1 or −1: the direction along the drive axis in which the walker was placed.
+    angle
+        Its orientation, rad.
+
+    Returns
+    -------
+    ndarray, shape (n, 2)
+        x and y of each bead.
+    """
+    design = np.array(kind.design)
+    masses = np.array(kind.radii) ** 3
+    place = facing * (design - masses @ design / masses.sum())
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    drive_axis = np.array(case.drive_axis)
+    across_axis = np.cross([0.0, 0.0, 1.0], case.drive_axis)
+    beads: FloatArray = place @ turn @ np.array([drive_axis, across_axis])[:, :2]
+    return beads
+
+
+def _draw_beads(axes: Axes, places: FloatArray, radii: Sequence[float], colour: str) -> None:
+    """Draw beads (places and radii in m) as discs to scale into axes in mm."""
+    from matplotlib.patches import Circle
+
+    for place, radius in zip(places, radii, strict=True):
+        axes.add_patch(Circle(1e3 * place, 1e3 * radius, fc=colour, ec="none", alpha=0.5))
+
+
+def _draw_edge(axes: Axes, case: Case) -> None:
+    """Draw the edge of the floor of a container: where the distance to its side walls is zero."""
+    boundary = case.boundary
+    edge = np.linspace(-0.55, 0.55, 221) * boundary.inner_width
+    grid = np.stack(np.meshgrid(edge, edge, boundary.inner_height / 2.0), axis=-1)
+    places = grid[:, :, 0]
+    clearance = boundary.geometry.side_clearance(places.reshape(-1, 3))
+    inside = clearance.reshape(places.shape[:2])
+    axes.contour(1e3 * edge, 1e3 * edge, inside, levels=[0.0], colors=[_GREY], linewidths=1.0)
 
 
 @styled
 def climb_figure(case: Case, tables: Tables) -> Figure:
-    """Heights of the clusters' leaders and of the surface, events, segregation, and bridges."""
-    clusters, members, bed = tables("clusters"), tables("members"), tables("bed")
-    leads = members["bead"] == np.append(clusters["leader"], -1)[members["track"]]
-    lines = {name: values[leads] for name, values in members.items()}
-    named, looks = np.cumsum(clusters["climbed"]), []
-    for track in np.unique(lines["track"]):
-        leader, speed = (
-            "large" if clusters["leader_large"][track] else "small",
-            clusters["speed"][track] * 1e3,
-        )
-        text = f"{clusters['size'][track]} beads climb, led by a\n{leader} one: {speed:.1f} mm/s"
-        look: dict[str, Any] = {"color": _OTHERS, "linewidth": 0.6}
-        if clusters["climbed"][track]:
-            look = {"color": f"C{named[track]}", "linewidth": 1.6, "label": text}
-            if named[track] > MOST_NAMED:
-                look["label"] = (
-                    f"and {named[-1] - MOST_NAMED} more climbs"
-                    if named[track] == MOST_NAMED + 1
-                    else ""
-                )
-        looks.append(look)
-    if not_climbing := [look for look in looks if "label" not in look]:
-        not_climbing[0]["label"] = "clusters that\ndid not climb"
-    two = [
-        [{"color": "C0", "label": first}, {"color": "C2", "linestyle": "--", "label": second}]
-        for first, second in (("all beads", "bulk alone"), ("bridges", "contacts"))
+    """Draw heights of clusters' leaders and of the surface, events, segregation, and bridges."""
+    clusters = tables("clusters")
+    members = tables("members")
+    bed = tables("bed")
+    leader_of_track = np.append(clusters["leader"], -1)
+    is_leader = members["bead"] == leader_of_track[members["track"]]
+    leaders = {name: values[is_leader] for name, values in members.items()}
+    looks = [
+        _leader_looks(clusters, np.unique(leaders["track"])),
+        _two_lines("all beads", "bulk alone"),
+        _two_lines("bridges", "contacts"),
     ]
-    figure, panels = _panels("climb", case, {"members": lines, "bed": bed}, [looks, *two])
-    (leaders, _, joined), height = panels, axis("bed", "surface")[1]
-    low, middle, high = (height * bed[name] for name in ("surface_low", "surface", "surface_high"))
-    band = "surface, 10th to\n90th percentile"
-    leaders.fill_between(bed["time"], low, high, color="0.85", lw=0, label=band, zorder=0)
-    leaders.plot(bed["time"], middle, color=_GREY, label="surface, median", zorder=1)
-    events = tables("events")
-    for kind, marker in _MARKS.items():
-        rows = events["event"] == kind
-        if rows.any():
-            look = {"marker": marker, "mfc": "none", "ls": "none", "color": _GREY, "label": kind}
-            leaders.plot(events["time"][rows], 1e3 * events["height"][rows], **look)
+    figure, panels = _draw_figure("climb", case, {"members": leaders, "bed": bed}, looks, {})
+    heights, _, joined = panels
+    _draw_surface(heights, bed)
+    _draw_events(heights, tables("events"))
     joined.set_ylabel("number per bead")
     joined.axhline(0.0, color="0.4", lw=0.6)
     for axes in panels:
@@ -443,3 +651,67 @@ def climb_figure(case: Case, tables: Tables) -> Figure:
     letter_panels(panels)
     figure.align_ylabels()
     return figure
+
+
+def _leader_looks(clusters: Columns, tracks: IntArray) -> list[Look]:
+    """Looks of the leaders of tracks: coloured if they climbed, and at most `MOST_NAMED` named."""
+    climbs = np.cumsum(clusters["climbed"])
+    more = climbs[-1] - MOST_NAMED if len(climbs) else 0
+    looks: list[Look] = []
+    has_others = False
+    for track in tracks:
+        number = climbs[track]
+        look: Look = {"color": _NOT_CLIMBING, "linewidth": 0.6}
+        if clusters["climbed"][track]:
+            look = {"color": f"C{number}", "linewidth": 1.6, "label": ""}
+            if number <= MOST_NAMED:
+                look["label"] = _climb_label(clusters, track)
+            elif number == MOST_NAMED + 1:
+                look["label"] = f"and {more} more climbs"
+        elif not has_others:
+            look["label"] = "clusters that\ndid not climb"
+            has_others = True
+        looks.append(look)
+    return looks
+
+
+def _climb_label(clusters: Columns, track: int) -> str:
+    """What a legend says of a climb: size of the cluster, size class of its leader, speed."""
+    leader = "large" if clusters["leader_large"][track] else "small"
+    speed = clusters["speed"][track] * 1e3
+    return f"{clusters['size'][track]} beads climb, led by a\n{leader} one: {speed:.1f} mm/s"
+
+
+def _two_lines(first: str, second: str) -> list[Look]:
+    """Looks of two lines with these labels."""
+    return [
+        {"color": "C0", "label": first},
+        {"color": "C2", "linestyle": "--", "label": second},
+    ]
+
+
+def _draw_surface(axes: Axes, bed: Columns) -> None:
+    """Draw the height of the surface of a pile: its median, and 10th to 90th percentile."""
+    _, factor = axis("bed", "surface")
+    low = factor * bed["surface_low"]
+    median = factor * bed["surface"]
+    high = factor * bed["surface_high"]
+    label = "surface, 10th to\n90th percentile"
+    axes.fill_between(bed["time"], low, high, color="0.85", lw=0, label=label, zorder=0)
+    axes.plot(bed["time"], median, color=_GREY, label="surface, median", zorder=1)
+
+
+def _draw_events(axes: Axes, events: Columns) -> None:
+    """Mark the events of clusters at their times and heights."""
+    for event, marker in _EVENT_MARKERS.items():
+        rows = events["event"] == event
+        if rows.any():
+            axes.plot(
+                events["time"][rows],
+                1e3 * events["height"][rows],
+                marker=marker,
+                mfc="none",
+                ls="none",
+                color=_GREY,
+                label=event,
+            )
