@@ -39,7 +39,14 @@ from walkers.postprocess.show.figures import (
 from walkers.postprocess.show.film_options import FilmOptions
 from walkers.postprocess.show.films import film_times
 from walkers.postprocess.show.meshes import mesh_of, walls_of
-from walkers.postprocess.show.necks import NO_BRIDGES, bridge_ends, bridges_at, neck_surfaces
+from walkers.postprocess.show.necks import (
+    NO_BRIDGES,
+    Ends,
+    NeckGrid,
+    bridge_ends,
+    bridges_at,
+    neck_surfaces,
+)
 from walkers.postprocess.show.paraview import _walls, write_vtk
 from walkers.postprocess.show.scene import Scene, gathered
 from walkers.postprocess.show.series import _series_figure
@@ -363,7 +370,7 @@ def test_a_neck_has_the_volume_of_its_bridge(
             [[0.0, 0.0, radius + gap], [radius + gap + motion.radius[1], 0.0, radius + gap]]
         )
         begins, ends = bridge_ends(motion, place, np.array([contact]))
-        points, _ = neck_surfaces(motion, np.array([contact]), (begins, ends), 65, 64)
+        points, _ = neck_surfaces(motion, np.array([contact]), Ends(begins, ends), NeckGrid(65, 64))
         length = np.linalg.norm(ends - begins)
         assert length == pytest.approx(radius + gap + other)
         height = (1e-3 * points[0] - begins[0]) @ (ends - begins)[0] / length

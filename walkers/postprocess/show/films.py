@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing
+from dataclasses import replace
 from math import ceil, log10
 from pathlib import Path
 from typing import NamedTuple
@@ -70,7 +71,7 @@ def render_film(
     times = film_times(motion, options)
     count, frames = len(times.time), slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
     around = _AROUND_TRAY if from_above(motion.case) else _AROUND
-    whole = Scene.around(motion, camera_axes(motion), around, frames, rolling=True)
+    whole = replace(Scene.around(motion, camera_axes(motion), around, frames), rolling=True)
     scene = whole.following(wide / tall, _AROUND, frames)
     bridges = bridges_at(motion, times.frame)
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,139 +1,272 @@
-"""Liquid necks: shapes of the bridges in pictures, films and the three-dimensional view.
+"""Liquid necks: the shapes of bridges in pictures, films and the three-dimensional view.
 
-A neck is as wide as the liquid of its bridge fills it. With the parabolic profile of the gap h(r) = s + r²/2R between
-two spheres, R = R₁R₂/(R₁ + R₂), or between a sphere and a plane, R = R₁, and a straight meniscus, its volume is
-V = πb²s + πb⁴/4R, hence b² = 2R (√(s² + V/πR) − s). Necks of longer gaps are thinner. V is the volume of the
-bridges of the case (`walkers.physics.capillary.bridge_volume`).
+A neck is as wide as the liquid of its bridge fills it. With the parabolic profile of the gap
+h(r) = s + r²/2R between two spheres, R = R₁R₂/(R₁ + R₂), or between a sphere and a plane, R = R₁,
+and a straight meniscus of radius b, its volume is V = πb²s + πb⁴/4R, hence
+b² = 2R (√(s² + V/πR) − s). Necks of longer gaps are thinner. V is the volume of the bridges of the
+case (`walkers.physics.capillary.bridge_volume`). Forces do not depend on these shapes.
 
-Y. I. Rabinovich, M. S. Esayanur, B. M. Moudgil, Langmuir 21 (2005) 10992–10997, doi 10.1021/la0517639 (volume).
+Y. I. Rabinovich, M. S. Esayanur, B. M. Moudgil, Langmuir 21 (2005) 10992–10997,
+doi 10.1021/la0517639 (volume).
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from walkers.arrays import FloatArray, IntArray
+from walkers.arrays import BoolArray, FloatArray, IntArray
 from walkers.inputs.tables.case import Case
 from walkers.physics.capillary import bridge_volume
 from walkers.postprocess.measure.motion import Motion, read_bridges
 
-NECK_COLOUR, NECK_OPACITY = 0x3FA0FF, 0.8
-"""Colour of necks; they are translucent."""
+NECK_COLOUR = 0x3FA0FF
+"""Colour of necks: red, green, blue."""
+NECK_OPACITY = 0.8
+"""Opacity of necks."""
 NECK_LEGEND = "blue: liquid bridges"
-Ends = tuple[FloatArray, FloatArray]
+"""What the colour of necks means."""
 NO_BRIDGES: IntArray = np.empty((0, 3), dtype=np.int64)
-_ENDS, _WAIST = (
-    1.12,
-    0.92,
-)  # width of a curved meniscus at its ends and in its middle over that of the straight one
-_WIDEST = 0.9  # largest width of a neck over that of the smaller bead
+"""Contacts of a frame without bridges."""
+_END_WIDTH = 1.12
+"""Width of a curved meniscus at its ends over that of the straight one."""
+_WAIST_WIDTH = 0.92
+"""Width of a curved meniscus in its middle over that of the straight one."""
+_LARGEST_WIDTH = 0.9
+"""Largest width of a neck over that of the smaller bead."""
+
+
+class Ends(NamedTuple):
+    """Where K bridges begin and end.
+
+    Attributes
+    ----------
+    first : ndarray, shape (K, 3)
+        Centres of the first beads, m.
+    second : ndarray, shape (K, 3)
+        Centres of the second beads, or the nearest points of walls, m.
+    """
+
+    first: FloatArray
+    second: FloatArray
+
+
+class NeckGrid(NamedTuple):
+    """How finely necks are drawn.
+
+    Attributes
+    ----------
+    rings
+        Number of rings of points along a neck.
+    sides
+        Number of points of a ring.
+    """
+
+    rings: int
+    sides: int
 
 
 def bridges_at(motion: Motion, frames: npt.ArrayLike) -> list[IntArray]:
-    """Contacts of the recorded bridges that are nearest in time to each of some frames."""
-    frames, stride = np.asarray(frames), motion.case.run.samples_per_bridge_sample
-    recorded = np.array(
-        [frame for frame, (_, number) in enumerate(motion.frames) if number % stride == 0]
-    )
+    """Contacts of the recorded bridges that are nearest in time to each of some frames.
+
+    Parameters
+    ----------
+    motion
+        The motion.
+    frames : array_like, shape (F,)
+        Numbers of frames of the motion, with fractions between two frames.
+
+    Returns
+    -------
+    list of ndarray, each of shape (K, 3)
+        Contacts as in `walkers.postprocess.measure.motion.Bridges`.
+    """
+    frames = np.asarray(frames)
+    numbers = np.array([number for _, number in motion.frames])
+    recorded = np.flatnonzero(numbers % motion.case.run.samples_per_bridge_sample == 0)
     if not len(recorded):
         return [NO_BRIDGES] * len(frames)
-    nearest = recorded[np.abs(np.subtract.outer(frames, recorded)).argmin(axis=1)].tolist()
+    distances = np.abs(np.subtract.outer(frames, recorded))
+    nearest = recorded[distances.argmin(axis=1)].tolist()
     contacts = {bridges.frame: bridges.contacts for bridges in read_bridges(motion, set(nearest))}
     return [contacts[frame] for frame in nearest]
 
 
 def bridges_text(case: Case) -> str:
     """What is blue, and how often the bridges were recorded if not in every frame."""
-    every = case.run.samples_per_cycle // case.run.samples_per_bridge_sample
-    often = "once" if every == 1 else f"{every} times"
-    return NECK_LEGEND + (
-        f", recorded {often} per cycle" if case.run.samples_per_bridge_sample > 1 else ""
-    )
+    stride = case.run.samples_per_bridge_sample
+    if stride == 1:
+        return NECK_LEGEND
+    per_cycle = case.run.samples_per_cycle // stride
+    times = "once" if per_cycle == 1 else f"{per_cycle} times"
+    return f"{NECK_LEGEND}, recorded {times} per cycle"
 
 
-def bridge_ends(motion: Motion, place: FloatArray, contacts: IntArray) -> Ends:
-    """Centres of the first beads of contacts, and of the second beads or the nearest points of walls, m, shape (K, 3).
+def bridge_ends(motion: Motion, position: FloatArray, contacts: IntArray) -> Ends:
+    """Ends of the bridges of contacts.
 
-    ``place`` are the centres of all beads relative to the boundary, m, shape (N, 3).
+    Parameters
+    ----------
+    motion
+        The motion, for its walls.
+    position : ndarray, shape (N, 3)
+        Centres of all beads relative to the boundary, m.
+    contacts : ndarray of int, shape (K, 3)
+        Contacts as in `walkers.postprocess.measure.motion.Bridges`.
     """
-    begins, ends = place[contacts[:, 0]], place[contacts[:, 1]]
+    first = position[contacts[:, 0]]
+    second = position[contacts[:, 1]]
     for number, wall in enumerate(motion.case.boundary.walls):
-        held = contacts[:, 2] == number
-        ends[held] = wall.nearest_points(begins[held])
-    return begins, ends
+        is_at_wall = contacts[:, 2] == number
+        second[is_at_wall] = wall.nearest_points(first[is_at_wall])
+    return Ends(first, second)
 
 
-def at_front_walls(
-    motion: Motion, contacts: IntArray, ends: Ends, toward: FloatArray
-) -> npt.NDArray[np.bool_]:
-    """Which contacts are with walls between the beads and a camera in the direction ``toward``, shape (K,).
+def at_front_walls(motion: Motion, contacts: IntArray, ends: Ends, toward: FloatArray) -> BoolArray:
+    """Which contacts are with walls between the beads and the camera.
 
     Pictures do not draw these walls, so that the beads are visible.
+
+    Parameters
+    ----------
+    motion
+        The motion.
+    contacts : ndarray of int, shape (K, 3)
+        Contacts.
+    ends
+        Their ends.
+    toward : ndarray, shape (3,)
+        Unit vector toward the camera.
+
+    Returns
+    -------
+    ndarray of bool, shape (K,)
     """
-    begins, second_ends = ends
-    to_walls = contacts[:, 2] >= 0
-    return np.asarray(
-        to_walls & ((second_ends - begins) @ toward > 0.5 * motion.radius[contacts[:, 0]])
-    )
+    is_at_wall = contacts[:, 2] >= 0
+    nearer = (ends.second - ends.first) @ toward
+    return np.asarray(is_at_wall & (nearer > 0.5 * motion.radius[contacts[:, 0]]))
 
 
 def neck_surfaces(
     motion: Motion,
     contacts: IntArray,
-    between: Ends,
-    rings: int,
-    sides: int,
+    ends: Ends,
+    grid: NeckGrid,
     share: FloatArray | float = 1.0,
-) -> Ends:
-    """Points and normals of the necks of contacts, mm, shape (K, rings × sides, 3), ``between`` their ends (`bridge_ends`).
+) -> tuple[FloatArray, FloatArray]:
+    """Surfaces of the necks of contacts.
 
-    ``share`` is the width that is drawn over the width of the neck.
+    A neck begins at the surface of its first bead and ends at that of the second, or at the wall.
+
+    Parameters
+    ----------
+    motion
+        The motion.
+    contacts : ndarray of int, shape (K, 3)
+        Contacts as in `walkers.postprocess.measure.motion.Bridges`.
+    ends
+        Their ends (`bridge_ends`).
+    grid
+        Number of rings and of points of each ring.
+    share : float or ndarray, shape (K,)
+        The width that is drawn over the width of the neck.
+
+    Returns
+    -------
+    points : ndarray, shape (K, rings × sides, 3)
+        Points of the surfaces, mm.
+    normals : ndarray, shape (K, rings × sides, 3)
+        Unit vectors across the axes of the necks, to the outside.
     """
-    begins, ends = between
     radius = motion.radius[contacts[:, 0]]
     second_radius = np.where(contacts[:, 1] < 0, np.inf, motion.radius[contacts[:, 1]])
-    volume = np.vectorize(bridge_volume, [float], excluded=[2])(
-        radius, second_radius, motion.case.liquid.of_bridges
-    )
-    reduced = 1.0 / (1.0 / radius + 1.0 / second_radius)
-    length = np.linalg.norm(ends - begins, axis=1)
-    beyond = np.where(np.isfinite(second_radius), second_radius, 0.0)
-    gap = np.maximum(length - radius - beyond, 0.0)
-    wide = np.sqrt(2.0 * reduced * (np.hypot(gap, np.sqrt(volume / (np.pi * reduced))) - gap))
-    wide = share * np.minimum(_ENDS * wide, _WIDEST * np.minimum(radius, second_radius))
-    along = (ends - begins) / length[:, None]
-    first = np.cross(along, np.eye(3)[np.abs(along).argmin(axis=1)])
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    around = 2.0 * np.pi * np.arange(sides) / sides
-    out = (
-        np.cos(around)[:, None] * first[:, None]
-        + np.sin(around)[:, None] * np.cross(along, first)[:, None]
-    )
-    # From the surface of the first bead to that of the second, or to the wall.
-    low = np.sqrt(radius**2 - wide**2)
-    high = length - np.sqrt(np.where(np.isfinite(second_radius), beyond**2 - wide**2, 0.0))
-    step = np.linspace(-1.0, 1.0, rings)
+    radius_beyond = np.where(np.isfinite(second_radius), second_radius, 0.0)
+    length = np.linalg.norm(ends.second - ends.first, axis=1)
+    gap = np.maximum(length - radius - radius_beyond, 0.0)
+    neck_radius = _neck_radius(motion, radius, second_radius, gap)
+    widest = _LARGEST_WIDTH * np.minimum(radius, second_radius)
+    end_radius = share * np.minimum(_END_WIDTH * neck_radius, widest)
+
+    # Heights are distances from the centre of the first bead along the axis.
+    low = np.sqrt(radius**2 - end_radius**2)
+    depth = np.where(np.isfinite(second_radius), radius_beyond**2 - end_radius**2, 0.0)
+    high = length - np.sqrt(depth)
+    step = np.linspace(-1.0, 1.0, grid.rings)
     height = (low + high)[:, None] / 2.0 + (high - low)[:, None] / 2.0 * step
-    width = wide[:, None] * (_WAIST + (_ENDS - _WAIST) * step**2) / _ENDS
-    points = begins[:, None, None] + height[..., None, None] * along[:, None, None]
-    points = points + width[..., None, None] * out[:, None]
-    normals = np.broadcast_to(out[:, None], points.shape)
-    return 1e3 * points.reshape(len(contacts), rings * sides, 3), normals.reshape(
-        len(contacts), rings * sides, 3
-    )
+    profile = _WAIST_WIDTH + (_END_WIDTH - _WAIST_WIDTH) * step**2
+    ring_radius = end_radius[:, None] * profile / _END_WIDTH
+
+    axis = (ends.second - ends.first) / length[:, None]
+    outward = _across(axis, grid.sides)[:, None]
+    points = ends.first[:, None, None] + height[..., None, None] * axis[:, None, None]
+    points = points + ring_radius[..., None, None] * outward
+    normals = np.broadcast_to(outward, points.shape)
+    shape = (len(contacts), grid.rings * grid.sides, 3)
+    return 1e3 * points.reshape(shape), normals.reshape(shape)
 
 
-def neck_triangles(count: int, rings: int, sides: int) -> npt.NDArray[Any]:
-    """Corners of the triangles of ``count`` necks, shape (T, 3), counterclockwise as seen from outside."""
-    low, side = np.arange((rings - 1) * sides), np.arange((rings - 1) * sides) % sides
-    beside = low - side + (side + 1) % sides
-    corners = np.concatenate(
-        [
-            np.stack([low, beside, low + sides], 1),
-            np.stack([beside, beside + sides, low + sides], 1),
-        ]
+def _neck_radius(
+    motion: Motion, radius: FloatArray, second_radius: FloatArray, gap: FloatArray
+) -> FloatArray:
+    """Radius b of straight necks (see above), m; a wall has an infinite ``second_radius``."""
+    liquid = motion.case.liquid.of_bridges
+    volume_of = np.vectorize(bridge_volume, [float], excluded=[2])
+    volume = volume_of(radius, second_radius, liquid)
+    reduced = 1.0 / (1.0 / radius + 1.0 / second_radius)
+    neck_radius: FloatArray = np.sqrt(
+        2.0 * reduced * (np.hypot(gap, np.sqrt(volume / (np.pi * reduced))) - gap)
     )
-    return (corners + rings * sides * np.arange(count)[:, None, None]).reshape(-1, 3)
+    return neck_radius
+
+
+def _across(axis: FloatArray, count: int) -> FloatArray:
+    """Unit vectors across axes, evenly around them.
+
+    Parameters
+    ----------
+    axis : ndarray, shape (K, 3)
+        Unit vectors.
+    count
+        Number of vectors around each axis.
+
+    Returns
+    -------
+    ndarray, shape (K, count, 3)
+    """
+    first = np.cross(axis, np.eye(3)[np.abs(axis).argmin(axis=1)])
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(axis, first)
+    angle = 2.0 * np.pi * np.arange(count) / count
+    across: FloatArray = (
+        np.cos(angle)[:, None] * first[:, None] + np.sin(angle)[:, None] * second[:, None]
+    )
+    return across
+
+
+def neck_triangles(count: int, grid: NeckGrid) -> IntArray:
+    """Triangles of a number of necks, as indices of their points in the order of `neck_surfaces`.
+
+    Parameters
+    ----------
+    count
+        Number of necks.
+    grid
+        Number of rings and of points of each ring.
+
+    Returns
+    -------
+    ndarray of int, shape (T, 3)
+        Corners of triangles, counterclockwise as seen from outside.
+    """
+    rings, sides = grid
+    corner = np.arange((rings - 1) * sides)  # of all rings but the last
+    side = corner % sides
+    neighbour = corner - side + (side + 1) % sides  # the next point of the same ring
+    lower = np.stack([corner, neighbour, corner + sides], 1)
+    upper = np.stack([neighbour, neighbour + sides, corner + sides], 1)
+    corners = np.concatenate([lower, upper])
+    first_points = rings * sides * np.arange(count)
+    triangles: IntArray = (corners + first_points[:, None, None]).reshape(-1, 3)
+    return triangles

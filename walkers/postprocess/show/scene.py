@@ -1,7 +1,8 @@
-"""Scene of a run: beads, walls, colours, motion and camera.
+"""Scene of a run: what a picture shows of the beads, in which colours, and how the camera follows.
 
-Reports and notebooks (`walkers.postprocess.show.report.player`) and ParaView
-(`walkers.postprocess.show.paraview`) show the same.
+`walkers.postprocess.show.window` draws scenes for pictures and films. Reports and notebooks
+(`walkers.postprocess.show.report.player`) and ParaView (`walkers.postprocess.show.paraview`) show
+the same. Directions of view are in `walkers.postprocess.show.camera`.
 """
 
 from __future__ import annotations
@@ -9,95 +10,138 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from walkers.arrays import FloatArray
+from walkers.arrays import BoolArray, FloatArray
 from walkers.errors import input_error
 from walkers.postprocess.measure import piles
 from walkers.postprocess.measure.motion import Motion
 
 RUBY = (0xB0203C, 0xE0566C)
+"""Colours of large and small highlighted beads: red, green, blue."""
 GLASS = (0x8C9AA5, 0xC9D2D8)
-"""Colours of large and small beads: highlighted beads and the others."""
-_PALE, _BRIGHTEST = (
-    0.72,
-    150.0,
-)  # share of white in the pale lunes; largest mean of red, green, blue in the dark ones
-_LONG, _ABOUT = 1.5, 1.4
-"""The camera follows the beads if the view of their whole path is larger than the view that follows them by more than
-the first factor. The second factor is the extent of the following view over the extent of the beads."""
+"""Colours of the other large and small beads: red, green, blue."""
+_PALE = 0.72
+"""Share of white in the pale lunes."""
+_BRIGHTEST = 150.0
+"""Largest mean of red, green and blue in the dark lunes, of 255."""
+_LONG_PATH = 1.5
+"""The camera follows the beads if the view of their whole path is larger than the view that follows
+them by more than this factor."""
+_FOLLOWING_EXTENT = 1.4
+"""Extent of a view that follows the beads over the extent of the beads."""
 
 
 def motion_in_view(motion: Motion, walker: int | None) -> tuple[Motion, bool]:
-    """What pictures and films show: the walker with a number, the first of independent walkers, or all beads.
+    """Select what pictures and films show of a motion.
 
-    The second value is whether it is a walker by itself; `InputError` if there is no walker with this number.
+    Parameters
+    ----------
+    motion
+        The motion.
+    walker
+        Number of a walker to show by itself; None: the first of independent walkers, otherwise all
+        beads.
+
+    Returns
+    -------
+    motion
+        The motion of what is shown.
+    is_single
+        Whether it is one walker by itself.
+
+    Raises
+    ------
+    InputError
+        If there is no walker with this number.
     """
     if walker is None and not motion.case.apart:
         return motion, False
-    number, count = walker or 0, len(motion.walkers)
+    number = walker or 0
+    count = len(motion.walkers)
     if not 0 <= number < count:
-        raise input_error(
-            "walker",
-            f"{number}: " + (f"expected 0 to {count - 1}" if count else "the run has no walkers"),
-        )
+        expected = f"expected 0 to {count - 1}" if count else "the run has no walkers"
+        raise input_error("walker", f"{number}: {expected}")
     return motion.of_walkers(motion.walkers[number : number + 1]), True
 
 
 def gathered(motion: Motion, lane: float = 2.0) -> Motion:
-    """Independent walkers moved onto parallel lanes for pictures; between walls the first walker alone.
+    """Move independent walkers onto parallel lanes for pictures.
 
-    All other motions are returned unchanged. ``lane`` is the distance of the lanes in lengths of the longest walker.
+    Between walls the first walker is shown alone. All other motions are returned unchanged.
+
+    Parameters
+    ----------
+    motion
+        The motion.
+    lane
+        Distance of the lanes in lengths of the longest walker.
     """
     case = motion.case
     if not case.apart:
         return motion
-    lane *= max(kind.length for kind in case.walkers)
+    distance = lane * max(kind.length for kind in case.walkers)
     across = np.cross([0.0, 0.0, 1.0], case.drive_axis)
     shift = np.zeros((len(motion.radius), 3))
     for number, walker in enumerate(motion.walkers):
-        shift[list(walker.beads)] = -number * lane * across - [*walker.origin, 0.0]
-    moved = replace(motion, position=motion.position + shift)
-    return moved if case.boundary.bare else moved.of_walkers(moved.walkers[:1])
+        shift[list(walker.beads)] = -number * distance * across - [*walker.origin, 0.0]
+    on_lanes = replace(motion, position=motion.position + shift)
+    if case.boundary.bare:
+        return on_lanes
+    return on_lanes.of_walkers(on_lanes.walkers[:1])
 
 
 def orientations_of(motion: Motion) -> FloatArray | None:
-    """Orientations of the beads: quaternions (x, y, z, w) of the rotation since the first frame, shape (F, N, 4).
+    """Orientations of the beads, integrated from their spins: dR/dt = [ω]× R.
 
-    The engine has no orientations of spheres; here its spins are integrated, dR/dt = [ω]× R. A bead turns by ω Δt about
-    ω between two frames. With walkers, ω is the average over all steps, and the result is exact if the axis is constant
-    during the interval. Otherwise ω is the mean of both frames, which is sufficient if the frames resolve the cycle;
-    None if they are too far apart.
+    The engine has no orientations of spheres. Here a bead turns by ω Δt about ω between two frames.
+    With walkers, ω is the average over all steps, and the result is exact if the axis is constant
+    during the interval. Otherwise ω is the mean of both frames, which is sufficient if the frames
+    resolve the cycle.
+
+    Returns
+    -------
+    ndarray, shape (F, N, 4), or None
+        Quaternions (x, y, z, w) of the rotation since the first frame; None if the frames are too
+        far apart.
     """
     from scipy.spatial.transform import Rotation
 
     if motion.mean_spin is None and not motion.follows_cycles:
         return None
-    steps, now = (
-        motion.averaged.spin * np.diff(motion.time)[:, None, None],
-        Rotation.identity(len(motion.radius)),
-    )
-    turned = [now.as_quat()]
+    steps = motion.averaged.spin * np.diff(motion.time)[:, None, None]
+    now = Rotation.identity(len(motion.radius))
+    orientations = [now.as_quat()]
     for step in steps:
         now = Rotation.from_rotvec(step) * now
-        turned.append(now.as_quat())
-    return np.array(turned)
+        orientations.append(now.as_quat())
+    return np.array(orientations)
 
 
-def rotations_at(turned: FloatArray, frame: float) -> FloatArray:
-    """Rotation matrices of the beads in a frame, or between two (a fraction), shape (N, 3, 3)."""
+def rotations_at(orientations: FloatArray, frame: float) -> FloatArray:
+    """Rotation matrices of the beads at a time.
+
+    Parameters
+    ----------
+    orientations : ndarray, shape (F, N, 4)
+        Quaternions of the beads in all frames (`orientations_of`).
+    frame
+        Number of a frame, with a fraction between two frames.
+
+    Returns
+    -------
+    ndarray, shape (N, 3, 3)
+    """
     from scipy.spatial.transform import Rotation
 
-    number, share = int(frame), frame % 1.0
-    begin, end = (
-        Rotation.from_quat(quaternions) for quaternions in turned[[number, number + ceil(share)]]
-    )
-    matrices: FloatArray = (
-        Rotation.from_rotvec(share * (end * begin.inv()).as_rotvec()) * begin
-    ).as_matrix()
+    number = int(frame)
+    fraction = frame % 1.0
+    before = Rotation.from_quat(orientations[number])
+    after = Rotation.from_quat(orientations[number + ceil(fraction)])
+    turn = (after * before.inv()).as_rotvec()
+    rotations = Rotation.from_rotvec(fraction * turn) * before
+    matrices: FloatArray = rotations.as_matrix()
     return matrices
 
 
@@ -105,10 +149,22 @@ def rotations_at(turned: FloatArray, frame: float) -> FloatArray:
 class Scene:
     """Beads, walls and an orthographic view of them.
 
-    The rows of ``axes`` are unit vectors to the right in the picture, up, and toward the camera; ``low`` and ``high``
-    are the limits of the view along them, mm. If ``shaken``, the view is in the laboratory, otherwise in the frame of
-    the boundary. ``rolling`` beads have two colours if their orientation is known. ``camera_path`` is the displacement of the
-    camera in each frame, mm, shape (F, 3); None for a camera at rest.
+    Attributes
+    ----------
+    motion
+        The motion, of F frames of N beads.
+    axes : ndarray, shape (3, 3)
+        Unit vectors to the right in the picture, up, and toward the camera, as rows.
+    low, high : ndarray, shape (3,)
+        Limits of the view along these axes, mm.
+    shaken
+        Whether the view is in the laboratory, so that the boundary shakes; otherwise it is in the
+        frame of the boundary.
+    rolling
+        Whether beads have two colours, if their orientations are known, so that they are seen to
+        roll.
+    camera_path : ndarray, shape (F, 3), or None
+        Displacement of the camera in each frame, mm; None for a camera at rest.
     """
 
     motion: Motion
@@ -124,56 +180,112 @@ class Scene:
         cls,
         motion: Motion,
         axes: FloatArray,
-        share: float = 1.0,
+        extent_factor: float = 1.0,
         frames: slice = slice(None),
-        **options: Any,
+        *,
+        shaken: bool = True,
     ) -> Scene:
-        """A view of the beads in some frames, and of the width and the floor of a container.
+        """A view, with a camera at rest, of the beads and of the width and floor of a container.
 
-        ``share`` is the extent of the picture over that of the beads. Options are ``shaken``, ``rolling`` and ``camera_path``,
-        with which the view does not include the container.
+        Parameters
+        ----------
+        motion
+            The motion.
+        axes : ndarray, shape (3, 3)
+            The axes of the view.
+        extent_factor
+            Extent of the view over that of what it shows.
+        frames
+            Frames in which all beads are in the view.
+        shaken
+            Whether the view is in the laboratory.
         """
-        seen = motion.position[frames]
-        if options.get("shaken", True):
-            seen = seen + motion.substrate[frames, None]
-        if (path := options.get("camera_path")) is not None:
-            seen = seen - 1e-3 * path[frames, None]
-        seen, radius = 1e3 * seen @ axes.T, 1e3 * motion.radius[:, None]
-        low, high = (seen - radius).min(axis=(0, 1)), (seen + radius).max(axis=(0, 1))
-        if motion.case.boundary.closed and path is None:
-            half = (
-                5e2 * motion.case.boundary.inner_width * np.array([1.0, axes[2, 2] > 0.5])
-            )  # from above also across
-            low[:2], high[:2] = np.minimum(low[:2], -half), np.maximum(high[:2], half)
-        wider = (share - 1.0) / 2.0 * (high - low)
-        return cls(motion, axes, low - wider, high + wider, **options)
+        position = motion.position[frames]
+        if shaken:
+            position = position + motion.substrate[frames, None]
+        low, high = _limits(position, motion.radius, axes)
+        boundary = motion.case.boundary
+        if boundary.closed:
+            is_from_above = axes[2, 2] > 0.5
+            half = 5e2 * boundary.inner_width * np.array([1.0, is_from_above])
+            low[:2] = np.minimum(low[:2], -half)
+            high[:2] = np.maximum(high[:2], half)
+        margin = (extent_factor - 1.0) / 2.0 * (high - low)
+        return cls(motion, axes, low - margin, high + margin, shaken)
 
-    def following(self, aspect: float, share: float = 1.0, frames: slice = slice(None)) -> Scene:
-        """The same view (`around`), or, if the path of the beads is long, a closer one that follows the beads."""
-        options = {
-            "shaken": self.shaken,
-            "rolling": self.rolling,
-            "camera_path": path_of(self.motion, frames.start or 0),
-        }
-        near = Scene.around(self.motion, self.axes, _ABOUT * share, frames, **options)
-        return near if self.height(aspect) > _LONG * near.height(aspect) else self
+    def on_path(
+        self, camera_path: FloatArray, extent_factor: float, frames: slice = slice(None)
+    ) -> Scene:
+        """The same view with a moving camera; it does not include the container.
+
+        Parameters
+        ----------
+        camera_path : ndarray, shape (F, 3)
+            Displacement of the camera in each frame, mm.
+        extent_factor
+            Extent of the view over that of the beads.
+        frames
+            Frames in which all beads are in the view.
+        """
+        position = self.motion.position[frames]
+        if self.shaken:
+            position = position + self.motion.substrate[frames, None]
+        position = position - 1e-3 * camera_path[frames, None]
+        low, high = _limits(position, self.motion.radius, self.axes)
+        margin = (extent_factor - 1.0) / 2.0 * (high - low)
+        return replace(self, low=low - margin, high=high + margin, camera_path=camera_path)
+
+    def following(
+        self, aspect: float, extent_factor: float = 1.0, frames: slice = slice(None)
+    ) -> Scene:
+        """The same view, or a closer one that follows the beads if their path is long.
+
+        Parameters
+        ----------
+        aspect
+            Width over height of the picture.
+        extent_factor
+            As in `around`.
+        frames
+            Frames in which all beads are in the view.
+        """
+        camera_path = _smoothed_path(self.motion, frames.start or 0)
+        closer = self.on_path(camera_path, _FOLLOWING_EXTENT * extent_factor, frames)
+        if self.height(aspect) > _LONG_PATH * closer.height(aspect):
+            return closer
+        return self
 
     def camera_displacement(self, frame: float) -> FloatArray:
-        """Displacement of the camera in a frame, or between two (a fraction), mm."""
-        number, share = int(frame), frame % 1.0
+        """Displacement of the camera in a frame, or between two frames (a fraction), mm."""
         if self.camera_path is None:
             return np.zeros(3)
-        return (1.0 - share) * self.camera_path[number] + share * self.camera_path[
-            number + ceil(share)
-        ]  # type: ignore[no-any-return]
+        number = int(frame)
+        fraction = frame % 1.0
+        before = self.camera_path[number]
+        after = self.camera_path[number + ceil(fraction)]
+        displacement: FloatArray = (1.0 - fraction) * before + fraction * after
+        return displacement
 
     def height(self, aspect: float) -> float:
         """Height of the picture, mm, for a ratio of width to height."""
-        right, up, _ = self.high - self.low
-        return float(max(up, right / aspect))
+        width, height, _ = self.high - self.low
+        return float(max(height, width / aspect))
 
     def camera(self, distance: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """A camera at a distance (mm) from the middle of the view: its position, the middle (mm), upward direction."""
+        """A camera at a distance from the middle of the view.
+
+        Parameters
+        ----------
+        distance
+            The distance, mm.
+
+        Returns
+        -------
+        position, middle : ndarray, shape (3,)
+            Position of the camera, and the middle of the view, mm.
+        up : ndarray, shape (3,)
+            Unit vector that is up in the picture.
+        """
         middle = (self.low + self.high) / 2.0 @ self.axes
         return middle + distance * self.axes[2], middle, self.axes[1]
 
@@ -183,34 +295,75 @@ class Scene:
         return orientations_of(self.motion) if self.rolling else None
 
     @cached_property
-    def highlighted(self) -> npt.NDArray[np.bool_]:
+    def highlighted(self) -> BoolArray:
         """Highlighted beads in each frame: walkers and climbing clusters; shape (F, N)."""
         motion = self.motion
-        chosen = np.tile(motion.walker_of >= 0, (len(motion.time), 1))
-        return chosen | piles.tracks_of(motion)[1] if piles.applies(motion.case) else chosen
+        highlighted = np.tile(motion.walker_of >= 0, (len(motion.time), 1))
+        if piles.applies(motion.case):
+            _, is_climber = piles.tracks_of(motion)
+            highlighted = highlighted | is_climber
+        return highlighted
 
     @property
     def colour_legend(self) -> list[str]:
         """What colours of beads mean, if that is not plain."""
-        return ["red: climbers"] if self.motion.case.loose and self.highlighted.any() else []
+        if self.motion.case.loose and self.highlighted.any():
+            return ["red: climbers"]
+        return []
 
-    def colours(self, chosen: npt.NDArray[np.bool_]) -> FloatArray:
-        """Red, green, blue (to 255) of the dark and the pale lunes of beads, shape (2, N, 3); chosen ones in ruby."""
+    def colours(self, highlighted: BoolArray) -> FloatArray:
+        """Colours of the dark and of the pale lunes of the beads.
+
+        Parameters
+        ----------
+        highlighted : ndarray of bool, shape (N,)
+            Beads in ruby; the others are grey.
+
+        Returns
+        -------
+        ndarray, shape (2, N, 3)
+            Red, green, blue from 0 to 255, of dark lunes, then of pale ones.
+        """
         large = self.motion.large
-        packed = np.where(chosen, np.where(large, *RUBY), np.where(large, *GLASS))
+        ruby = np.where(large, *RUBY)
+        glass = np.where(large, *GLASS)
+        packed = np.where(highlighted, ruby, glass)
         plain = (packed[:, None] >> np.array([16, 8, 0]) & 255).astype(np.float64)
         if self.orientations is None:
             return np.stack([plain, plain])
-        darker = plain * np.minimum(1.0, _BRIGHTEST / plain.mean(axis=1, keepdims=True))
-        return np.stack([darker, plain + _PALE * (255.0 - plain)])
+        dark = plain * np.minimum(1.0, _BRIGHTEST / plain.mean(axis=1, keepdims=True))
+        pale = plain + _PALE * (255.0 - plain)
+        return np.stack([dark, pale])
 
 
-def path_of(motion: Motion, begin: int = 0) -> FloatArray:
-    """Displacement of the centre of the beads since a frame, smoothed over a cycle, mm, shape (F, 3)."""
+def _limits(
+    position: FloatArray, radius: FloatArray, axes: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Lowest and highest coordinates of beads along the axes of a view, mm, shape (3,) each.
+
+    Parameters
+    ----------
+    position : ndarray, shape (F, N, 3)
+        Centres of the beads, m.
+    radius : ndarray, shape (N,)
+        Radii of the beads, m.
+    axes : ndarray, shape (3, 3)
+        Axes of the view, as rows.
+    """
+    seen = 1e3 * position @ axes.T
+    margin = 1e3 * radius[:, None]
+    return (seen - margin).min(axis=(0, 1)), (seen + margin).max(axis=(0, 1))
+
+
+def _smoothed_path(motion: Motion, start: int) -> FloatArray:
+    """Displacement of the mean position of the beads, smoothed over a cycle, mm, shape (F, 3).
+
+    It is zero in the frame ``start``.
+    """
     middle = 1e3 * motion.position.mean(axis=1)
     half = min(motion.case.run.samples_per_cycle, len(middle) - 1) // 2
-    beyond = np.pad(
-        middle, ((half, half), (0, 0)), "reflect", reflect_type="odd"
-    )  # a straight path goes on
-    smooth = np.lib.stride_tricks.sliding_window_view(beyond, 2 * half + 1, axis=0).mean(axis=-1)
-    return np.asarray(smooth - smooth[begin])
+    # The odd reflection continues a straight path straight on.
+    extended = np.pad(middle, ((half, half), (0, 0)), "reflect", reflect_type="odd")
+    windows = np.lib.stride_tricks.sliding_window_view(extended, 2 * half + 1, axis=0)
+    smooth = windows.mean(axis=-1)
+    return np.asarray(smooth - smooth[start])

@@ -1,10 +1,11 @@
-"""Off-screen window that draws pictures of a scene (PyVista)."""
+"""Off-screen window that draws pictures of a scene with VTK, through PyVista."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,8 @@ from walkers.postprocess.show.necks import (
     NECK_COLOUR,
     NECK_OPACITY,
     NO_BRIDGES,
+    Ends,
+    NeckGrid,
     at_front_walls,
     bridge_ends,
     neck_surfaces,
@@ -26,220 +29,364 @@ from walkers.postprocess.show.scene import Scene, rotations_at
 if TYPE_CHECKING:
     import pyvista as pv
 
-
 Picture = npt.NDArray[np.uint8]
 """Red, green, blue, shape (height, width, 3)."""
-_GROUND, _LINES, _WALL, _EDGE = "#e3e8eb", "#bcc6cd", "#eef1f3", "#5a6670"
-_SHADOW = 0.4  # opacity of a shadow below the centre of a bead
-_FINE = ((10, 72, (9, 36)), (100, 30, (7, 24)), (500, 18, (5, 12)), (np.inf, 12, (3, 8)))
-"""For fewer beads than the first number: cells around a ball; rings and sides of a neck."""
-_FINER = 1.5  # pixels that are drawn over those of the picture, in each direction
-_BEYOND = 6.0  # extent of the floor over that of the picture
+_GROUND = "#e3e8eb"
+"""Colour of an open floor."""
+_LINES = "#bcc6cd"
+"""Colour of lines on floors and walls."""
+_WALL = "#eef1f3"
+"""Colour of walls."""
+_EDGE = "#5a6670"
+"""Colour of the edges of walls."""
+_SHADOW = 0.4
+"""Opacity of a shadow below the centre of a bead."""
+_SUPERSAMPLING = 1.5
+"""Pixels that are drawn over those of the picture, in each direction."""
+_FLOOR_EXTENT = 6.0
+"""Extent of the floor over that of the picture."""
+
+
+@dataclass(frozen=True)
+class _Detail:
+    """How finely a number of beads is drawn.
+
+    Attributes
+    ----------
+    beads
+        There are fewer beads than this.
+    cells
+        Cells around a ball, a multiple of six.
+    necks
+        Rings and sides of a neck.
+    """
+
+    beads: float
+    cells: int
+    necks: NeckGrid
+
+
+_DETAILS = (
+    _Detail(10, 72, NeckGrid(9, 36)),
+    _Detail(100, 30, NeckGrid(7, 24)),
+    _Detail(500, 18, NeckGrid(5, 12)),
+    _Detail(np.inf, 12, NeckGrid(3, 8)),
+)
+"""From few beads to many."""
 
 
 class Window:
-    """An off-screen window that shows a scene; ``size`` is its width and height in pixels."""
+    """An off-screen window that shows a scene; close it after use.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    size
+        Width and height of pictures in pixels.
+
+    Attributes
+    ----------
+    pixels_per_mm : float
+        Resolution of the pictures.
+    """
 
     def __init__(self, scene: Scene, size: Sequence[int]) -> None:
         # Otherwise VTK first tries an X server, and prints that.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
         import pyvista as pv
 
-        self._scene, self._bare, radius = (
-            scene,
-            scene.motion.case.boundary.bare,
-            1e3 * scene.motion.radius,
-        )
-        self._size, finer = (size[0], size[1]), [round(_FINER * length) for length in size]
-        # In software, smooth edges by a finer picture and simple blending take half of the time of VTK's own ways.
-        self._plotter = pv.Plotter(off_screen=True, window_size=finer, lighting="light kit")
+        width, height = size
+        is_bare = scene.motion.case.boundary.bare
+        self._scene = scene
+        self._size = (width, height)
+        finer_size = [round(_SUPERSAMPLING * width), round(_SUPERSAMPLING * height)]
+        # In software, smooth edges by a finer picture, and simple blending, take half of the time
+        # of VTK's own methods.
+        self._plotter = pv.Plotter(off_screen=True, window_size=finer_size, lighting="light kit")
         self._plotter.disable_anti_aliasing()
         self._plotter.renderer.SetUseOIT(False)
-        self._plotter.background_color = pv.Color(_GROUND if self._bare else "white")
-        tall = scene.height(size[0] / size[1])
-        wide = max(tall, tall * size[0] / size[1])
-        self.pixels_per_mm = size[1] / tall
-        self._place, self._middle, up = scene.camera(10.0 * tall)
-        self._plotter.camera_position = [self._place, self._middle, up]
-        self._plotter.camera.parallel_projection, self._plotter.camera.parallel_scale = (
-            True,
-            tall / 2.0,
-        )
-        self._around = self._floor(wide) if self._bare else self._walls(wide)
-        self._plotter.camera.clipping_range = (0.1 * tall, 40.0 * wide)
-        if self._bare:
-            disc = pv.Disc(inner=0.0, outer=1.0, r_res=8, c_res=48).triangulate()
-            self._shadows = _Copies(
-                self._plotter, disc.points, disc.regular_faces, radius, lighting=False
-            )
-            black = np.zeros((disc.n_points, 4))
-            black[:, 3] = 255.0 * _SHADOW * (1.0 - np.linalg.norm(disc.points, axis=1) ** 2) ** 2
-            self._shadows.colour(np.tile(black, (len(radius), 1, 1)))
-        rounds, self._round = next(
-            (cells, neck) for most, cells, neck in _FINE if len(radius) < most
-        )
-        points, triangles, self._pale = beach_ball(rounds, scene.motion)
-        self._beads = _Copies(self._plotter, points, triangles, radius, specular=0.4)
-        look = {
-            "ambient": 0.45,
-            "diffuse": 0.75,
-            "specular": 0.4,
-            "culling": "back",
-            "interpolation": "Phong",
-        }
-        liquid = pv.Property(color=f"#{NECK_COLOUR:06x}", opacity=NECK_OPACITY, **look)
-        self._necks = pv.Actor(mapper=pv.DataSetMapper(), prop=liquid)
-        self._necks.mapper.scalar_visibility = False
-        self._plotter.add_actor(self._necks, reset_camera=False, render=False)
+        self._plotter.background_color = pv.Color(_GROUND if is_bare else "white")
+
+        height_mm = scene.height(width / height)
+        extent_mm = max(height_mm, height_mm * width / height)
+        self.pixels_per_mm = height / height_mm
+        self._camera_position, self._middle, up = scene.camera(10.0 * height_mm)
+        self._plotter.camera_position = [self._camera_position, self._middle, up]
+        self._plotter.camera.parallel_projection = True
+        self._plotter.camera.parallel_scale = height_mm / 2.0
+
+        self._boundary = self._add_floor(extent_mm) if is_bare else self._add_walls(extent_mm)
+        self._plotter.camera.clipping_range = (0.1 * height_mm, 40.0 * extent_mm)
+        self._shadows = self._add_shadows() if is_bare else None
+        count = len(scene.motion.radius)
+        detail = next(detail for detail in _DETAILS if count < detail.beads)
+        self._neck_grid = detail.necks
+        points, triangles, self._pale = beach_ball(detail.cells, scene.motion)
+        black = np.zeros((count, len(points), 3))
+        self._beads = _Copies(self._plotter, points, triangles, 1e3 * scene.motion.radius, black)
+        self._beads.property.specular = 0.4
+        self._necks = self._add_necks()
 
     def picture(self, frame: float, bridges: IntArray = NO_BRIDGES) -> Picture:
-        """Picture of a frame, or of a time between two frames (a fraction) by cubic interpolation.
+        """Draw the scene at a time.
 
-        Bridges are contacts as in `walkers.postprocess.measure.motion.Bridges`.
+        Parameters
+        ----------
+        frame
+            Number of a frame, or a time between two frames (a fraction) by cubic interpolation.
+        bridges : ndarray of int, shape (K, 3)
+            The contacts of bridges as in `walkers.postprocess.measure.motion.Bridges`.
         """
         from PIL import Image
 
-        motion, shift, number = self._scene.motion, np.zeros(3), int(frame)
-        place, share, turned = motion.position[number], frame - number, self._scene.orientations
-        if share:
-            place = between(motion.select(slice(number, number + 2)), share)[0]
-        if self._scene.shaken:
-            time = np.interp([frame], np.arange(len(motion.time)), motion.time)
-            shift = 1e3 * visible_displacement(motion.case.excitation, time)[0]
-        self._beads.colour(
-            self._scene.colours(self._scene.highlighted[number])[self._pale].swapaxes(0, 1)
-        )
-        self._beads.move(
-            1e3 * place + shift, None if turned is None else rotations_at(turned, frame)
-        )
-        if self._bare:
-            self._shadows.move(1e3 * place * [1.0, 1.0, 0.0] + shift)
-        self._wet(place, bridges, shift)
-        for actor in self._around:
+        position = self._position_at(frame)
+        shift = self._shift_at(frame)
+        self._move_beads(position, shift, frame)
+        if self._shadows is not None:
+            self._shadows.move(1e3 * position * [1.0, 1.0, 0.0] + shift)
+        self._draw_necks(position, bridges, shift)
+        for actor in self._boundary:
             actor.position = tuple(shift)
-        moved = self._scene.camera_displacement(frame)
-        self._plotter.camera.SetPosition(
-            self._place + moved
-        )  # pyvista's own also looks for the limits of the scene
-        self._plotter.camera.SetFocalPoint(self._middle + moved)
+        displacement = self._scene.camera_displacement(frame)
+        # PyVista's own setters also look for the limits of the scene.
+        self._plotter.camera.SetPosition(self._camera_position + displacement)
+        self._plotter.camera.SetFocalPoint(self._middle + displacement)
         self._plotter.render()  # a screenshot alone renders only the first time
-        picture = Image.fromarray(
-            np.array(self._plotter.screenshot(return_img=True), dtype=np.uint8)
-        )
-        return np.asarray(picture.resize(self._size, Image.Resampling.BOX))
+        pixels = np.array(self._plotter.screenshot(return_img=True), dtype=np.uint8)
+        return np.asarray(Image.fromarray(pixels).resize(self._size, Image.Resampling.BOX))
 
     def close(self) -> None:
         """Close the window."""
         self._plotter.close()
 
-    def _wet(self, place: FloatArray, bridges: IntArray, shift: FloatArray) -> None:
-        """Draw the liquid necks; walls before the beads are not drawn, nor are the necks to them."""
+    def _position_at(self, frame: float) -> FloatArray:
+        """Centres of the beads relative to the boundary at a time, m, shape (N, 3)."""
+        motion = self._scene.motion
+        number = int(frame)
+        fraction = frame - number
+        if not fraction:
+            return np.asarray(motion.position[number])
+        return np.asarray(between(motion.select(slice(number, number + 2)), fraction)[0])
+
+    def _shift_at(self, frame: float) -> FloatArray:
+        """Displacement of the boundary in the view at a time, mm, shape (3,)."""
+        if not self._scene.shaken:
+            return np.zeros(3)
+        motion = self._scene.motion
+        time = np.interp([frame], np.arange(len(motion.time)), motion.time)
+        return 1e3 * visible_displacement(motion.case.excitation, time)[0]
+
+    def _move_beads(self, position: FloatArray, shift: FloatArray, frame: float) -> None:
+        """Colour the beads, turn them, and move them to their positions (m) and a shift (mm)."""
+        scene = self._scene
+        colours = scene.colours(scene.highlighted[int(frame)])
+        self._beads.colour(colours[self._pale].swapaxes(0, 1))
+        rotations = None
+        if scene.orientations is not None:
+            rotations = rotations_at(scene.orientations, frame)
+        self._beads.move(1e3 * position + shift, rotations)
+
+    def _draw_necks(self, position: FloatArray, bridges: IntArray, shift: FloatArray) -> None:
+        """Draw the liquid necks, but not those to walls before the beads, which are not drawn."""
         import pyvista as pv
 
         motion = self._scene.motion
-        begins, ends = bridge_ends(motion, place, bridges)
-        before = at_front_walls(motion, bridges, (begins, ends), self._scene.axes[2])
-        contacts, between = bridges[~before], (begins[~before], ends[~before])
+        ends = bridge_ends(motion, position, bridges)
+        is_visible = ~at_front_walls(motion, bridges, ends, self._scene.axes[2])
+        contacts = bridges[is_visible]
         self._necks.visibility = bool(len(contacts))
         if not len(contacts):
             return
-        points, normals = (
-            array.reshape(-1, 3) for array in neck_surfaces(motion, contacts, between, *self._round)
-        )
-        necks = pv.PolyData.from_regular_faces(
-            points + shift, neck_triangles(len(contacts), *self._round)
-        )
-        necks.point_data["Normals"] = normals
+        visible_ends = Ends(ends.first[is_visible], ends.second[is_visible])
+        points, normals = neck_surfaces(motion, contacts, visible_ends, self._neck_grid)
+        triangles = neck_triangles(len(contacts), self._neck_grid)
+        necks = pv.PolyData.from_regular_faces(points.reshape(-1, 3) + shift, triangles)
+        necks.point_data["Normals"] = normals.reshape(-1, 3)
         necks.point_data.active_normals_name = "Normals"
         self._necks.mapper.SetInputData(necks)
 
-    def _floor(self, wide: float) -> list[pv.Actor]:
-        """Lines that make the motion of a floor visible, which is as bright as the background."""
+    def _add_necks(self) -> pv.Actor:
+        """Add an actor for the necks, without a shape as yet."""
         import pyvista as pv
 
-        path = np.zeros((1, 3)) if self._scene.camera_path is None else self._scene.camera_path
-        half, middle = _BEYOND * wide / 2.0, self._middle * [1.0, 1.0, 0.0]
-        low, high = middle + path.min(axis=0) - half, middle + path.max(axis=0) + half
-        lines = pv.line_segments_from_points(floor_lines(low, high, round_below(wide / 8.0)))
-        lines.translate([0.0, 0.0, -1e-3 * wide], inplace=True)
-        return [self._plotter.add_mesh(lines, color=_LINES, line_width=3, lighting=False)]
+        liquid = pv.Property(
+            color=f"#{NECK_COLOUR:06x}",
+            opacity=NECK_OPACITY,
+            ambient=0.45,
+            diffuse=0.75,
+            specular=0.4,
+            culling="back",
+            interpolation="Phong",
+        )
+        necks = pv.Actor(mapper=pv.DataSetMapper(), prop=liquid)
+        necks.mapper.scalar_visibility = False
+        self._plotter.add_actor(necks, reset_camera=False, render=False)
+        return necks
 
-    def _walls(self, wide: float) -> list[pv.Actor]:
-        """Walls behind the beads and, slightly nearer to the camera, the edges of all walls."""
+    def _add_shadows(self) -> _Copies:
+        """Add a shadow of each bead, which fades toward its edge."""
+        import pyvista as pv
+
+        radius = 1e3 * self._scene.motion.radius
+        disc = pv.Disc(inner=0.0, outer=1.0, r_res=8, c_res=48).triangulate()
+        distance = np.linalg.norm(disc.points, axis=1)
+        black = np.zeros((disc.n_points, 4))
+        black[:, 3] = 255.0 * _SHADOW * (1.0 - distance**2) ** 2
+        colours = np.tile(black, (len(radius), 1, 1))
+        shadows = _Copies(self._plotter, disc.points, disc.regular_faces, radius, colours)
+        shadows.property.lighting = False
+        return shadows
+
+    def _add_floor(self, extent: float) -> list[pv.Actor]:
+        """Add lines that make the motion of an open floor visible.
+
+        The floor itself is as bright as the background. ``extent`` is the larger side of the view,
+        mm.
+        """
+        import pyvista as pv
+
+        camera_path = self._scene.camera_path
+        if camera_path is None:
+            camera_path = np.zeros((1, 3))
+        half = _FLOOR_EXTENT * extent / 2.0
+        middle = self._middle * [1.0, 1.0, 0.0]
+        low = middle + camera_path.min(axis=0) - half
+        high = middle + camera_path.max(axis=0) + half
+        lines = pv.line_segments_from_points(floor_lines(low, high, round_below(extent / 8.0)))
+        lines.translate([0.0, 0.0, -1e-3 * extent], inplace=True)
+        return [self._add_lines(lines, _LINES)]
+
+    def _add_walls(self, extent: float) -> list[pv.Actor]:
+        """Add walls behind the beads and, slightly nearer to the camera, the edges of all walls.
+
+        If the camera moves, there are also marks on the walls. ``extent`` is the larger side of the
+        view, mm.
+        """
         faces = [1e3 * corners for corners in walls_of(self._scene.motion)]
         walls = mesh_of(faces).clean(tolerance=1e-6, absolute=True)
         edges = walls.extract_feature_edges(
             feature_angle=30.0, manifold_edges=False, non_manifold_edges=False
         )
-        edges.translate(1e-2 * wide * self._scene.axes[2], inplace=True)
-        parts = [
+        edges.translate(1e-2 * extent * self._scene.axes[2], inplace=True)
+        actors = [
             self._plotter.add_mesh(walls, color=_WALL, lighting=False, culling="back"),
-            self._plotter.add_mesh(edges, color=_EDGE, line_width=3, lighting=False),
+            self._add_lines(edges, _EDGE),
         ]
         if self._scene.camera_path is not None:
-            marks = self._marks(
-                faces,
-                int(np.argmax(np.ptp(self._scene.camera_path, axis=0))),
-                round_below(wide / 8.0),
-            )
-            parts.append(self._plotter.add_mesh(marks, color=_LINES, line_width=3, lighting=False))
-        return parts
+            path_axis = int(np.argmax(np.ptp(self._scene.camera_path, axis=0)))
+            marks = self._marks(faces, path_axis, round_below(extent / 8.0))
+            actors.append(self._add_lines(marks, _LINES))
+        return actors
 
-    def _marks(self, faces: Sequence[FloatArray], axis: int, step: float) -> pv.PolyData:
-        """Lines on the walls behind the beads, across the path of the camera, that make its motion visible."""
+    def _add_lines(self, lines: pv.PolyData, colour: str) -> pv.Actor:
+        """Add lines, which no light changes."""
+        return self._plotter.add_mesh(lines, color=colour, line_width=3, lighting=False)
+
+    def _marks(self, faces: Sequence[FloatArray], path_axis: int, step: float) -> pv.PolyData:
+        """Lines on the walls behind the beads, which make the motion of the camera visible.
+
+        Parameters
+        ----------
+        faces
+            Corners of each wall, mm, each of shape (K, 3).
+        path_axis
+            The axis along which the camera moves: 0, 1 or 2. The lines are across it.
+        step
+            Distance of the lines, mm.
+        """
         import pyvista as pv
 
         toward = self._scene.axes[2]
-        behind = [
-            face for face in faces if np.cross(face[1] - face[0], face[2] - face[1]) @ toward > 0.0
-        ]
-        walls, along = mesh_of(behind), np.eye(3)[axis]
-        low, high = walls.bounds[2 * axis : 2 * axis + 2]
+        behind = []
+        for face in faces:
+            normal = np.cross(face[1] - face[0], face[2] - face[1])
+            if normal @ toward > 0.0:
+                behind.append(face)
+        walls = mesh_of(behind)
+        direction = np.eye(3)[path_axis]
+        low, high = walls.bounds[2 * path_axis : 2 * path_axis + 2]
         places = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
-        lines: pv.PolyData = pv.merge(
-            [walls.slice(normal=along, origin=place * along) for place in places]
-        )
+        slices = [walls.slice(normal=direction, origin=place * direction) for place in places]
+        lines: pv.PolyData = pv.merge(slices)
         lines.translate(1e-2 * step * toward, inplace=True)
         return lines
 
 
 class _Copies:
-    """Copies of a unit mesh, one per bead, with the positions, orientations and colours of a frame; mm."""
+    """Copies of a unit mesh, one per bead, with the positions, orientations and colours of a frame.
+
+    Parameters
+    ----------
+    plotter
+        The plotter to which they are added.
+    points : ndarray, shape (V, 3)
+        Points of the unit mesh.
+    triangles : ndarray of int, shape (T, 3)
+        Corners of its triangles.
+    radius : ndarray, shape (N,)
+        Radii of the beads, mm.
+    colours : ndarray, shape (N, V, 3 or 4)
+        Colours of the points as for `colour`.
+
+    Attributes
+    ----------
+    property
+        How they reflect light.
+    """
 
     def __init__(
-        self, plotter: pv.Plotter, points: Any, triangles: Any, radius: FloatArray, **look: Any
+        self,
+        plotter: pv.Plotter,
+        points: npt.NDArray[np.floating],
+        triangles: npt.NDArray[np.integer],
+        radius: FloatArray,
+        colours: FloatArray,
     ) -> None:
         import pyvista as pv
 
-        faces = (triangles + len(points) * np.arange(len(radius))[:, None, None]).reshape(-1, 3)
-        self._points, self._radius = (
-            np.asarray(points, np.float32),
-            radius[:, None, None].astype(np.float32),
-        )
-        self._mesh = pv.PolyData(
-            np.tile(self._points, (len(radius), 1)), np.insert(faces, 0, 3, axis=1).ravel()
-        )
-        self.colour(np.zeros((len(radius), len(points), 4 if "lighting" in look else 3)))
+        count = len(radius)
+        first_points = len(points) * np.arange(count)
+        faces = (triangles + first_points[:, None, None]).reshape(-1, 3)
+        cells = np.insert(faces, 0, 3, axis=1)  # the number of corners before them
+        self._points = np.asarray(points, np.float32)
+        self._radius = radius[:, None, None].astype(np.float32)
+        self._mesh = pv.PolyData(np.tile(self._points, (count, 1)), cells.ravel())
+        self.colour(colours)
         self._mesh.point_data["Normals"] = np.asarray(self._mesh.points).copy()
         self._mesh.point_data.active_normals_name = "Normals"
         # The invisible halves of spheres are half of the work.
-        drawn = plotter.add_mesh(
-            self._mesh, scalars="colour", rgb=True, smooth_shading=False, culling="back", **look
+        actor = plotter.add_mesh(
+            self._mesh, scalars="colour", rgb=True, smooth_shading=False, culling="back"
         )
-        drawn.prop.interpolation = "Phong"  # with these normals; pyvista would compute others
+        self.property = actor.prop
+        self.property.interpolation = "Phong"  # with these normals; pyvista would compute others
 
-    def move(self, centres: FloatArray, turned: FloatArray | None = None) -> None:
-        """Move them to centres, shape (N, 3), and turn them by rotation matrices, shape (N, 3, 3)."""
-        turned = np.tile(np.eye(3), (len(centres), 1, 1)) if turned is None else turned
+    def move(self, centres: FloatArray, rotations: FloatArray | None = None) -> None:
+        """Move and turn the copies.
+
+        Parameters
+        ----------
+        centres : ndarray, shape (N, 3)
+            Centres, mm.
+        rotations : ndarray, shape (N, 3, 3)
+            Rotation matrices; None: no rotation.
+        """
+        if rotations is None:
+            rotations = np.tile(np.eye(3), (len(centres), 1, 1))
         # The points of a unit sphere are its normals.
-        normals = self._points @ np.swapaxes(turned, 1, 2).astype(np.float32)
-        self._mesh.points = (self._radius * normals + centres[:, None].astype(np.float32)).reshape(
-            -1, 3
-        )
+        normals = self._points @ np.swapaxes(rotations, 1, 2).astype(np.float32)
+        points = self._radius * normals + centres[:, None].astype(np.float32)
+        self._mesh.points = points.reshape(-1, 3)
         self._mesh.point_data["Normals"] = normals.reshape(-1, 3)
 
     def colour(self, colours: FloatArray) -> None:
-        """Set the colours of the points: red, green, blue and perhaps opacity, up to 255, shape (N, V, 3 or 4)."""
-        self._mesh.point_data["colour"] = (
-            colours.reshape(-1, colours.shape[-1]).round().astype(np.uint8)
-        )
+        """Set the colours of the points.
+
+        Parameters
+        ----------
+        colours : ndarray, shape (N, V, 3 or 4)
+            Red, green, blue, and opacity if there are four, from 0 to 255.
+        """
+        colours = colours.reshape(-1, colours.shape[-1])
+        self._mesh.point_data["colour"] = colours.round().astype(np.uint8)
