@@ -1,22 +1,23 @@
 """Films of runs with rolling beads, physical time, slow motion and a scale bar.
 
-The view is in the laboratory, so that the boundary shakes; the camera follows the beads if their path is long. If
-successive pictures are half a cycle apart or more, all show the same phase of the drive (stroboscopic). On a tilted
-boundary an arrow shows the direction of gravity.
+The view is in the laboratory, so that the boundary shakes; the camera follows the beads if their
+path is long. If successive pictures are half a cycle apart or more, all show the same phase of
+the drive (stroboscopic). On a tilted boundary an arrow shows the direction of gravity. Pictures at
+a few times are made in `walkers.postprocess.show.series`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import closing
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import ceil, log10
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from walkers.arrays import FloatArray
+from walkers.arrays import FloatArray, IntArray
 from walkers.errors import WalkersError, input_error
 from walkers.extras import require
 from walkers.files import replacing
@@ -30,18 +31,37 @@ from walkers.postprocess.show.scene import Scene, motion_in_view
 from walkers.postprocess.show.window import Picture, Window
 from walkers.progress import Progress, Tell
 
-_AROUND, _AROUND_TRAY = (
-    1.2,
-    1.3,
-)  # extent of the picture over that of the paths of the beads, or of the tray
-_LETTERS, _WIDE, _LEAST_LETTERS = (
-    24,
-    42,
-    15,
-)  # lines and heights of a line per picture; smallest height, pixels
-_SECONDS = 10.0  # largest duration of a film without a given slowdown, s
-_LEAST_SEEN = 10.0  # smallest number of recorded frames per second of such a film, if they do not resolve the cycle
-_COLOURS, _SAMPLES = 40, 6  # colours of a GIF; pictures from which they are chosen
+if TYPE_CHECKING:
+    from PIL.ImageDraw import ImageDraw
+
+_EXTENT_FACTOR = 1.2
+"""Extent of the picture over that of the paths of the beads."""
+_TRAY_EXTENT_FACTOR = 1.3
+"""Extent of the picture over that of a tray."""
+_LONGEST_FILM = 10.0
+"""Largest duration of a film without a given slowdown, s."""
+_LEAST_FRAMES_PER_SECOND = 10.0
+"""Smallest number of recorded frames per second of such a film, if frames do not resolve cycles."""
+
+# --- captions ---
+_LINES_PER_PICTURE = 24
+"""Height of a picture over that of a line of text."""
+_LINES_PER_WIDTH = 42
+"""Width of a picture over the height of a line of text."""
+_LEAST_LINE_HEIGHT = 15
+"""Smallest height of a line of text, pixels."""
+_BLACK = "black"
+"""Colour of the time, the scale bar and gravity."""
+_DARK_GREY = "#333333"
+"""Colour of the other texts."""
+
+# --- files ---
+_MP4_QUALITY = 7
+"""Quality of an MP4, from 0 to 10."""
+_GIF_COLOURS = 40
+"""Colours of a GIF."""
+_GIF_SAMPLES = 6
+"""Pictures from which the colours of a GIF are chosen."""
 
 
 def render_film(
@@ -51,52 +71,82 @@ def render_film(
     *,
     on_progress: Tell | None = None,
 ) -> Path:
-    """Render a film (MP4 or GIF, by default ``film.mp4`` in the run directory); see `FilmOptions` for what it shows.
+    """Render a film of a run.
 
-    `InputError` if the format cannot hold the film, the walker does not exist, or no frame is between begin and end;
-    `WalkersError` if ffmpeg fails. ``on_progress`` is called after each frame.
+    Parameters
+    ----------
+    directory
+        A run directory.
+    to
+        The file, an MP4 or a GIF; None: ``film.mp4`` in the run directory.
+    options
+        What the film shows.
+    on_progress
+        Called after each picture.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the format cannot hold the film, the walker does not exist, or no frame is between begin
+        and end.
+    WalkersError
+        If ffmpeg fails.
     """
-    path, (wide, tall) = to or directory / "film.mp4", options.size
+    path = to or directory / "film.mp4"
     check_place(path, ".mp4", ".gif")
-    if is_gif := path.suffix.lower() == ".gif":
-        if 100 % options.fps or options.fps > 50:  # pictures last whole hundredths of a second
-            raise input_error(
-                "fps", f"{options.fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF"
-            )
-    elif wide % 2 or tall % 2:
-        raise input_error("size", f"{wide}x{tall}: expected even numbers for an MP4")
+    is_gif = path.suffix.lower() == ".gif"
+    if is_gif:
+        _check_gif(options)
     else:
+        _check_mp4(options)
         require("film")
     motion, _ = motion_in_view(read_motion(directory).driven, options.walker)
     times = film_times(motion, options)
-    count, frames = len(times.time), slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
-    around = _AROUND_TRAY if from_above(motion.case) else _AROUND
-    whole = replace(Scene.around(motion, camera_axes(motion), around, frames), rolling=True)
-    scene = whole.following(wide / tall, _AROUND, frames)
+    scene = _scene_of(motion, times, options)
     bridges = bridges_at(motion, times.frame)
     path.parent.mkdir(parents=True, exist_ok=True)
     with closing(Window(scene, options.size)) as window, beside(path) as new:
-        write = _captions(scene, times, window.pixels_per_mm, options.size)
-
-        def pictures(numbers: Iterable[int], tell: Tell | None = None) -> Iterator[Picture]:
-            for number in numbers:
-                yield write(window.picture(times.frame[number], bridges[number]), number)
-                if tell is not None:
-                    tell(Progress((number + 1) / count, f"{number + 1} of {count} frames"))
-
-        every = pictures(range(count), on_progress)
+        captions = _Captions(scene, times, window.pixels_per_mm, options.size)
+        film = _Film(window, captions, times, bridges)
         if is_gif:
-            samples = np.linspace(0, count - 1, _SAMPLES).astype(int).tolist()
-            _write_gif(new, every, options.fps, np.concatenate([*pictures(samples)]))
+            _write_gif(new, film, options.fps, on_progress)
         else:
-            _write_mp4(new, every, options, count)
+            _write_mp4(new, film, options, on_progress)
     return path
 
 
-class FilmTimes(NamedTuple):
-    """Times of the K pictures of a film (s), and their frames of the motion, with fractions between two.
+def _check_gif(options: FilmOptions) -> None:
+    """Raise `InputError` unless pictures last whole hundredths of a second, as those of GIFs do."""
+    if 100 % options.fps or options.fps > 50:
+        raise input_error("fps", f"{options.fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF")
 
-    In a ``stroboscopic`` film all pictures are at one phase of the drive.
+
+def _check_mp4(options: FilmOptions) -> None:
+    """Raise `InputError` for a size that an MP4 cannot have."""
+    width, height = options.size
+    if width % 2 or height % 2:
+        raise input_error("size", f"{width}x{height}: expected even numbers for an MP4")
+
+
+@dataclass(frozen=True)
+class FilmTimes:
+    """Times of the K pictures of a film.
+
+    Attributes
+    ----------
+    time : ndarray, shape (K,)
+        Physical time, s.
+    frame : ndarray, shape (K,)
+        Frame of the motion, with a fraction between two frames.
+    slowdown
+        Time of the film over physical time.
+    stroboscopic
+        Whether all pictures are at one phase of the drive.
     """
 
     time: FloatArray
@@ -108,126 +158,230 @@ class FilmTimes(NamedTuple):
 def film_times(motion: Motion, options: FilmOptions) -> FilmTimes:
     """Distribute the pictures of a film over the drive.
 
-    Pictures that are half a cycle apart or more are moved to whole cycles, otherwise they would show a beat. If the
-    frames do not resolve the cycle, each picture is the nearest frame. Times outside of the drive raise an InputError.
+    Pictures that are half a cycle apart or more are moved to whole cycles, otherwise they would
+    show a beat. If the frames do not resolve the cycle, each picture is the nearest frame. Raises
+    `InputError` for times outside of the drive.
     """
-    last, begin = float(motion.time[-1]), options.begin
-    end = last if options.end is None else min(options.end, last)
+    last = float(motion.time[-1])
+    begin = options.begin
+    end = last
+    if options.end is not None:
+        end = min(options.end, last)
     if not 0.0 <= begin < end:
-        message = (
-            f"nothing to show: expected times within the drive, 0 to {last:.4g} s, begin before end"
+        raise input_error(
+            "begin, end",
+            f"nothing to show: expected times within the drive, 0 to {last:.4g} s, "
+            "begin before end",
         )
-        raise input_error("begin, end", message)
-    follows, slowdown = motion.follows_cycles, options.slowdown
+    slowdown = options.slowdown
     if slowdown is None:
-        largest = _SECONDS / (end - begin)
-        if not follows:
-            largest = min(largest, 1.0 / (_LEAST_SEEN * float(np.median(np.diff(motion.time)))))
-        slowdown = max(1.0, round_below(largest))
-    interval, cycle = 1.0 / (options.fps * slowdown), 1.0 / motion.case.excitation.frequency
+        slowdown = _default_slowdown(motion, end - begin)
+    interval = 1.0 / (options.fps * slowdown)
+    cycle = 1.0 / motion.case.excitation.frequency
     time = begin + interval * np.arange(int((end - begin) / interval + 1e-9) + 1)
-    strobed = interval >= cycle / 2.0
-    if strobed:
+    is_beat = interval >= cycle / 2.0
+    if is_beat:
         time = np.round(time / cycle) * cycle
     numbers = np.arange(len(motion.time))
     frame = np.interp(time, motion.time, numbers)
-    frame = frame if follows else frame.round()
-    one_phase = strobed or motion.case.run.samples_per_cycle == 1
-    return FilmTimes(np.interp(frame, numbers, motion.time), frame, slowdown, one_phase)
-
-
-def _captions(
-    scene: Scene, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
-) -> Callable[[Picture, int], Picture]:
-    """A function that draws time, distance, slow motion, drive, tilt, scale bar and gravity into a picture."""
-    from matplotlib import get_data_path
-    from PIL import Image, ImageDraw, ImageFont
-
-    (wide, tall), case = size, scene.motion.case
-    above = from_above(case) or wide > 2 * tall  # of the beads, no room is left beside them
-    edge = max(_LEAST_LETTERS, min(tall // _LETTERS, wide // _WIDE))
-    # Pillow's own font has no × and no ².
-    font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
-    large, small = (ImageFont.truetype(font, round(share * edge)) for share in (1.2, 0.85))
-    # All pictures may show the same frame.
-    decimals = max(0, ceil(-log10(float(np.diff(times.time).max(initial=0.0)) or 1.0) - 1e-9))
-    speed = speed_text(times.slowdown) + (", stroboscopic" if times.stroboscopic else "")
-    bar = round_below(wide / 5.0 / pixels_per_mm)
-    toward, direction = named_direction(scene.motion)
-    left, right, level, thick = (
-        wide - edge - bar * pixels_per_mm,
-        wide - edge,
-        tall - edge,
-        max(2, edge // 8),
+    if not motion.follows_cycles:
+        frame = frame.round()
+    return FilmTimes(
+        time=np.interp(frame, numbers, motion.time),
+        frame=frame,
+        slowdown=slowdown,
+        stroboscopic=is_beat or motion.case.run.samples_per_cycle == 1,
     )
 
-    def written(picture: Picture, number: int) -> Picture:
-        page = Image.fromarray(picture)
-        draw = ImageDraw.Draw(page)
-        clock, lines = f"{times.time[number]:.{decimals}f} s", [speed]
-        if scene.camera_path is not None:
-            lines.append(
-                f"{scene.camera_displacement(times.frame[number]) @ toward:z.1f} mm {direction} from the start"
-            )
-        lines += [case.boundary.tilted] if case.boundary.tilted else []
-        lines += scene.colour_legend
-        lines += bridges_text(case).split(", ")  # lines of their own beside the beads
-        draw.text((edge, edge), clock, "black", large, anchor="lt")
-        if above:
-            draw.text(
-                (2 * edge + large.getlength(clock), 1.2 * edge),
-                ", ".join(lines),
-                "#333333",
-                small,
-                anchor="lt",
-            )
-        else:
-            for row, text in enumerate(lines):
-                draw.text((edge, (2.8 + 1.5 * row) * edge), text, "#333333", small, anchor="lt")
-        draw.text((edge, level), case.excitation.described(), "#333333", small, anchor="ls")
-        if case.boundary.tilted and case.environment.gravity:
-            tip = 5.5 * edge
-            draw.line([right, edge, right, tip - edge], "black", thick)
-            draw.polygon(
-                [right - 0.4 * edge, tip - edge, right + 0.4 * edge, tip - edge, right, tip],
-                "black",
-            )
-            draw.text((right - 0.8 * edge, 3.0 * edge), "g", "black", large, anchor="rm")
-        draw.rectangle([left, level - thick, right, level], "black")
-        draw.text(
-            ((left + right) / 2.0, level - 1.5 * thick), f"{bar:g} mm", "black", small, anchor="md"
-        )
-        return np.asarray(page)
 
-    return written
+def _default_slowdown(motion: Motion, duration: float) -> float:
+    """Slow motion, of 1, 2, 5, 10, …, of a film of a physical duration (s)."""
+    largest = _LONGEST_FILM / duration
+    if not motion.follows_cycles:
+        frame_interval = float(np.median(np.diff(motion.time)))
+        largest = min(largest, 1.0 / (_LEAST_FRAMES_PER_SECOND * frame_interval))
+    return max(1.0, round_below(largest))
+
+
+def _scene_of(motion: Motion, times: FilmTimes, options: FilmOptions) -> Scene:
+    """The view of a film, in which the beads stay from its first to its last picture."""
+    width, height = options.size
+    frames = slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
+    extent_factor = _TRAY_EXTENT_FACTOR if from_above(motion.case) else _EXTENT_FACTOR
+    whole = Scene.around(motion, camera_axes(motion), extent_factor, frames)
+    whole = replace(whole, rolling=True)
+    return whole.following(width / height, _EXTENT_FACTOR, frames)
+
+
+@dataclass(frozen=True)
+class _Film:
+    """The pictures of a film, which are drawn when they are asked for.
+
+    Attributes
+    ----------
+    window
+        Draws the scene.
+    captions
+        Draws texts into pictures.
+    times
+        Times of K pictures.
+    bridges : list of ndarray, each of shape (B, 3)
+        Contacts of the bridges of each picture.
+    """
+
+    window: Window
+    captions: _Captions
+    times: FilmTimes
+    bridges: list[IntArray]
+
+    @property
+    def count(self) -> int:
+        """Number of pictures."""
+        return len(self.times.time)
+
+    def pictures(
+        self, numbers: Iterable[int], on_progress: Tell | None = None
+    ) -> Iterator[Picture]:
+        """Draw the pictures with some numbers; ``on_progress`` is called after each."""
+        for number in numbers:
+            picture = self.window.picture(self.times.frame[number], self.bridges[number])
+            yield self.captions.draw_into(picture, number)
+            if on_progress is not None:
+                done = number + 1
+                on_progress(Progress(done / self.count, f"{done} of {self.count} frames"))
+
+
+class _Captions:
+    """Texts of a film: time, slow motion, drive, tilt, scale bar and gravity.
+
+    Parameters
+    ----------
+    scene
+        The scene that pictures show.
+    times
+        Times of the pictures.
+    pixels_per_mm
+        Resolution of the pictures.
+    size
+        Their width and height in pixels.
+    """
+
+    def __init__(
+        self, scene: Scene, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
+    ) -> None:
+        from matplotlib import get_data_path
+        from PIL import ImageFont
+
+        self._scene = scene
+        self._case = scene.motion.case
+        self._times = times
+        self._width, self._height = size
+        line_height = min(self._height // _LINES_PER_PICTURE, self._width // _LINES_PER_WIDTH)
+        self._line = max(_LEAST_LINE_HEIGHT, line_height)
+        # Pillow's own font has no × and no ².
+        font = Path(get_data_path()) / "fonts" / "ttf" / "DejaVuSans.ttf"
+        self._large = ImageFont.truetype(font, round(1.2 * self._line))
+        self._small = ImageFont.truetype(font, round(0.85 * self._line))
+        # All pictures may show the same frame; then the interval is zero.
+        interval = float(np.diff(times.time).max(initial=0.0)) or 1.0
+        self._decimals = max(0, ceil(-log10(interval) - 1e-9))
+        self._bar = round_below(self._width / 5.0 / pixels_per_mm)  # mm
+        self._bar_pixels = self._bar * pixels_per_mm
+        self._stroke = max(2, self._line // 8)
+
+    def draw_into(self, picture: Picture, number: int) -> Picture:
+        """Draw the captions of the picture with a number into it."""
+        from PIL import Image, ImageDraw
+
+        image = Image.fromarray(picture)
+        draw = ImageDraw.Draw(image)
+        self._draw_texts(draw, number)
+        if self._case.boundary.tilted and self._case.environment.gravity:
+            self._draw_gravity(draw)
+        self._draw_bar(draw)
+        return np.asarray(image)
+
+    def _texts(self, number: int) -> list[str]:
+        """What is written below or beside the time of a picture."""
+        speed = speed_text(self._times.slowdown)
+        if self._times.stroboscopic:
+            speed += ", stroboscopic"
+        texts = [speed]
+        if self._scene.camera_path is not None:
+            toward, direction = named_direction(self._scene.motion)
+            displacement = self._scene.camera_displacement(self._times.frame[number]) @ toward
+            texts.append(f"{displacement:z.1f} mm {direction} from the start")
+        if self._case.boundary.tilted:
+            texts.append(self._case.boundary.tilted)
+        texts += self._scene.colour_legend
+        texts += bridges_text(self._case).split(", ")
+        return texts
+
+    def _draw_texts(self, draw: ImageDraw, number: int) -> None:
+        """Write time, slow motion and legend at the top, and the drive at the bottom."""
+        line = self._line
+        clock = f"{self._times.time[number]:.{self._decimals}f} s"
+        draw.text((line, line), clock, _BLACK, self._large, anchor="lt")
+        texts = self._texts(number)
+        if from_above(self._case) or self._width > 2 * self._height:
+            # Below the time the texts would be over the beads.
+            left = 2 * line + self._large.getlength(clock)
+            draw.text((left, 1.2 * line), ", ".join(texts), _DARK_GREY, self._small, anchor="lt")
+        else:
+            for row, text in enumerate(texts):
+                place = (line, (2.8 + 1.5 * row) * line)
+                draw.text(place, text, _DARK_GREY, self._small, anchor="lt")
+        drive = self._case.excitation.described()
+        draw.text((line, self._height - line), drive, _DARK_GREY, self._small, anchor="ls")
+
+    def _draw_gravity(self, draw: ImageDraw) -> None:
+        """Draw an arrow that points down, with its name."""
+        line = self._line
+        x = self._width - line
+        tip = 5.5 * line
+        head = tip - line
+        half_width = 0.4 * line
+        draw.line([x, line, x, head], _BLACK, self._stroke)
+        draw.polygon([x - half_width, head, x + half_width, head, x, tip], _BLACK)
+        draw.text((x - 0.8 * line, 3.0 * line), "g", _BLACK, self._large, anchor="rm")
+
+    def _draw_bar(self, draw: ImageDraw) -> None:
+        """Draw the scale bar with its length."""
+        right = self._width - self._line
+        left = right - self._bar_pixels
+        bottom = self._height - self._line
+        draw.rectangle([left, bottom - self._stroke, right, bottom], _BLACK)
+        place = ((left + right) / 2.0, bottom - 1.5 * self._stroke)
+        draw.text(place, f"{self._bar:g} mm", _BLACK, self._small, anchor="md")
 
 
 def speed_text(slowdown: float) -> str:
     """The slow motion as text: ``20 × slower``."""
     if slowdown == 1.0:
         return "real time"
-    return f"{slowdown:.4g} × slower" if slowdown > 1.0 else f"{1.0 / slowdown:.4g} × faster"
+    if slowdown > 1.0:
+        return f"{slowdown:.4g} × slower"
+    return f"{1.0 / slowdown:.4g} × faster"
 
 
-def _write_mp4(path: Path, pictures: Iterator[Picture], options: FilmOptions, count: int) -> None:
-    """Write H.264 with ffmpeg, which does not report a full disk."""
+def _write_mp4(path: Path, film: _Film, options: FilmOptions, on_progress: Tell | None) -> None:
+    """Write H.264 with ffmpeg, and count the pictures: ffmpeg does not report a full disk."""
     from imageio_ffmpeg import count_frames_and_secs, write_frames
 
-    # The index at the begin of the file: browsers play it while it loads. The preset takes 0.6 of the time of ffmpeg's
-    # own, for files that are larger by a tenth.
-    how = ["-movflags", "+faststart", "-preset", "veryfast"]
+    # The index at the start of the file: browsers play it while it loads. The preset takes 0.6 of
+    # the time of ffmpeg's own, for files that are larger by a tenth.
     writer = write_frames(
         path,
         options.size,
         fps=options.fps,
         codec="libx264",
-        quality=7,
+        quality=_MP4_QUALITY,
         macro_block_size=2,
-        output_params=how,
+        output_params=["-movflags", "+faststart", "-preset", "veryfast"],
     )
     writer.send(None)
     try:
-        for picture in pictures:
+        for picture in film.pictures(range(film.count), on_progress):
             writer.send(np.ascontiguousarray(picture))
     finally:
         writer.close()
@@ -235,21 +389,27 @@ def _write_mp4(path: Path, pictures: Iterator[Picture], options: FilmOptions, co
         written, _ = count_frames_and_secs(str(path))
     except (RuntimeError, OSError):
         written = 0
-    if written != count:
+    if written != film.count:
         raise WalkersError(
-            f"ffmpeg wrote {written} of the {count} pictures of {path.parent}: is the disk full?"
+            f"ffmpeg wrote {written} of the {film.count} pictures of {path.parent}: "
+            "is the disk full?"
         )
 
 
-def _write_gif(path: Path, pictures: Iterator[Picture], fps: int, samples: Picture) -> None:
+def _write_gif(path: Path, film: _Film, fps: int, on_progress: Tell | None) -> None:
     """Write all pictures with one palette and no dithering, so that parts at rest need no space."""
     from PIL import Image
 
-    palette = Image.fromarray(samples).quantize(_COLOURS, method=Image.Quantize.MEDIANCUT)
-    reduced = (
-        Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
-        for picture in pictures
-    )
-    next(reduced).save(
-        path, save_all=True, append_images=reduced, duration=1000 // fps, loop=0, optimize=False
+    samples = np.linspace(0, film.count - 1, _GIF_SAMPLES).astype(int).tolist()
+    sample = Image.fromarray(np.concatenate(list(film.pictures(samples))))
+    palette = sample.quantize(_GIF_COLOURS, method=Image.Quantize.MEDIANCUT)
+
+    def reduced() -> Iterator[Image.Image]:
+        for picture in film.pictures(range(film.count), on_progress):
+            image = Image.fromarray(picture)
+            yield image.quantize(palette=palette, dither=Image.Dither.NONE)
+
+    images = reduced()
+    next(images).save(
+        path, save_all=True, append_images=images, duration=1000 // fps, loop=0, optimize=False
     )
