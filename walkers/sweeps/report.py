@@ -11,7 +11,13 @@ from walkers.errors import InputError
 from walkers.files import write_bytes
 from walkers.postprocess.measure.results import Results
 from walkers.postprocess.measure.uncertainty import uncertain_value_lines
-from walkers.postprocess.show.report.page import REPORT_NAME, check_report, fill, page_of, svg_of
+from walkers.postprocess.show.report.page import (
+    REPORT_NAME,
+    check_report,
+    page_of,
+    render_html,
+    svg_of,
+)
 from walkers.sweeps.factors import readable_key
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
@@ -48,18 +54,17 @@ def report_sweep(table: SweepTable, path: Path) -> Path:
     links = [_link(table.results.get(point), path) for point in frame["point"]]
     svg, left_out = _figure(table)
     cells, same = cells_of(frame.drop(columns="run"), readable_key)
-    body = fill(
-        "sweep.html.j2",
-        "walkers.sweeps",
-        title=frame.attrs["title"],
-        name=frame.attrs["sweep"],
-        points=list(zip(links, cells.to_numpy().tolist(), strict=True)),
-        svg=svg,
-        left_out=left_out,
-        uncertain="\n".join(uncertain_value_lines(_uncertain_values(table))),
-        heads=list(cells),
-        same=same,
-    )
+    values = {
+        "title": frame.attrs["title"],
+        "name": frame.attrs["sweep"],
+        "points": list(zip(links, cells.to_numpy().tolist(), strict=True)),
+        "svg": svg,
+        "left_out": left_out,
+        "uncertain": "\n".join(uncertain_value_lines(_uncertain_values(table))),
+        "heads": list(cells),
+        "same": same,
+    }
+    body = render_html("sweep.html.j2", values, "walkers.sweeps")
     write_bytes(path, page_of(frame.attrs["title"], body).encode())
     return path
 

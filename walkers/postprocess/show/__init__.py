@@ -1,1 +1,1 @@
-"""Pictures, films, figures, reports, and files for ParaView and LAMMPS of what a run has measured."""
+"""Figures, pictures, films and reports of runs, and files for ParaView and LAMMPS."""

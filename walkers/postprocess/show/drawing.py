@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 
 from walkers.errors import input_error
-from walkers.files import replacing
 from walkers.text import printable
 
 if TYPE_CHECKING:

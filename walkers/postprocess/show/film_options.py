@@ -11,34 +11,49 @@ from cyclopts import Parameter
 from walkers.errors import check_limits, input_error
 
 _NUMBER = re.compile(r"[\d.]+(e[-+]?\d+)?", re.IGNORECASE)
+"""A number without a unit."""
+_PIXELS = re.compile(r"(\d{2,4})x(\d{2,4})")
+"""Width and height in pixels."""
 _SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080)}
-_LEAST = 64
+"""Names of sizes: width and height in pixels."""
+_LEAST_SIZE = 64
+"""Smallest width and height, pixels."""
 
 
-def _size(_type: Any, tokens: Any) -> tuple[int, int]:
-    """Read a size such as ``720p`` or ``1280x720`` as width and height in pixels; otherwise `InputError`."""
+def _read_size(_type: Any, tokens: Any) -> tuple[int, int]:
+    """Read a size such as ``720p`` or ``1280x720`` as width and height in pixels.
+
+    Raises `InputError` for any other text.
+    """
     text = tokens[0].value
-    if numbers := re.fullmatch(r"(\d{2,4})x(\d{2,4})", text.strip().lower()):
-        return int(numbers[1]), int(numbers[2])
+    pixels = _PIXELS.fullmatch(text.strip().lower())
+    if pixels:
+        return int(pixels[1]), int(pixels[2])
     if text not in _SIZES:
+        names = ", ".join(_SIZES)
         raise input_error(
-            "size", f"{text!r}: expected {', '.join(_SIZES)}, or width and height such as 1280x720"
+            "size", f"{text!r}: expected {names}, or width and height such as 1280x720"
         )
     return _SIZES[text]
 
 
-def _seconds(_type: Any, tokens: Any) -> float:
-    """Read the physical time of an option, such as ``0.1 s`` or a number, in s; otherwise `InputError`."""
+def _read_seconds(_type: Any, tokens: Any) -> float:
+    """Read the physical time of an option, such as ``0.1 s`` or a number, in s.
+
+    Raises `InputError` for any other text.
+    """
     from walkers.inputs.units import DURATION, parse_quantity
 
-    option, text = tokens[0].keyword, tokens[0].value
+    option = tokens[0].keyword
+    text = tokens[0].value
+    with_unit = f"{text} s" if _NUMBER.fullmatch(text) else text
     try:
-        return parse_quantity(f"{text} s" if _NUMBER.fullmatch(text) else text, DURATION)
+        return parse_quantity(with_unit, DURATION)
     except ValueError as error:
         raise input_error(option, f'{text!r}: expected a time such as "0.1 s"') from error
 
 
-Seconds = Annotated[float, Parameter(converter=_seconds, metavar="TIME")]
+Seconds = Annotated[float, Parameter(converter=_read_seconds, metavar="TIME")]
 """A time, s; the program reads it with its unit."""
 
 
@@ -50,13 +65,16 @@ class FilmOptions:
     Parameters
     ----------
     size
-        Film: width and height in pixels; as an option 360p, 480p, 720p, 1080p, or pixels such as 1280x720.
+        Film: width and height in pixels; as an option 360p, 480p, 720p, 1080p, or pixels such as
+        1280x720.
     fps
         Film: frames per second.
     slowdown
-        Film: slow motion factor; default: 1, 2, 5, 10, ..., chosen so that the film lasts 5 to 10 s.
+        Film: slow motion factor; default: 1, 2, 5, 10, ..., chosen so that the film lasts 5 to
+        10 s.
     walker
-        Walker to show by itself, counted from 0; default: the first of independent walkers, otherwise all beads.
+        Walker to show by itself, counted from 0; default: the first of independent walkers,
+        otherwise all beads.
     begin
         Film: physical time of the first frame, s; as an option with its unit, such as '0.1 s'.
     end
@@ -65,7 +83,7 @@ class FilmOptions:
 
     size: Annotated[
         tuple[int, int],
-        Parameter(converter=_size, n_tokens=1, metavar="SIZE", show_default=lambda _: "720p"),
+        Parameter(converter=_read_size, n_tokens=1, metavar="SIZE", show_default=lambda _: "720p"),
     ] = _SIZES["720p"]
     fps: int = 25
     slowdown: float | None = None
@@ -75,6 +93,6 @@ class FilmOptions:
 
     def __post_init__(self) -> None:
         """Check what does not depend on a run."""
-        check_limits("size", min(self.size), _LEAST)
+        check_limits("size", min(self.size), _LEAST_SIZE)
         check_limits("fps", self.fps, 1, 60)
         check_limits("slowdown", self.slowdown, 0.05, 1e4)

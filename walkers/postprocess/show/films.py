@@ -20,7 +20,6 @@ import numpy as np
 from walkers.arrays import FloatArray, IntArray
 from walkers.errors import WalkersError, input_error
 from walkers.extras import require
-from walkers.files import replacing
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.show.camera import camera_axes, from_above, named_direction
 from walkers.postprocess.show.drawing import check_place

@@ -1,1 +1,4 @@
-"""Reports: one HTML file of a run, with plots and a scene that plays, which needs no network; and its pieces."""
+"""Reports of runs: one HTML file with tables, figures and a scene that plays.
+
+It needs no network. Reports of sweeps use the same page.
+"""

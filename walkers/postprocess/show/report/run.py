@@ -12,7 +12,7 @@ from walkers.files import write_bytes
 from walkers.inputs.origins import Origin, text_of
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.caption import caption
-from walkers.postprocess.measure.motion import read_motion
+from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.measure.numbers import rows
 from walkers.postprocess.measure.results import (
     BAND_NOTE,
@@ -28,8 +28,8 @@ from walkers.postprocess.show.report.page import (
     LARGEST_REPORT,
     REPORT_NAME,
     check_report,
-    fill,
     page_of,
+    render_html,
     svg_of,
 )
 from walkers.postprocess.show.report.player import MOST_PLACES, player_of
@@ -51,72 +51,134 @@ def report_run(
     figures: Mapping[str, Figure] = {},
     largest: int = LARGEST_REPORT,
 ) -> Path:
-    """Write the report of a run as a self-contained HTML file, by default ``report.html`` in the run directory.
+    """Write the report of a run as a self-contained HTML file.
 
-    ``origins`` are the sources of the values of its case, ``figures`` further ones, such as that of
-    its spread. The player shows fewer frames of runs of many beads, so that the file has fewer
-    bytes than ``largest``. `InputError` if the file is no HTML file in an existing folder,
-    `walkers.postprocess.measure.dump.DumpError` if a dump cannot be read.
+    Parameters
+    ----------
+    directory
+        A run directory.
+    to
+        The file; None: ``report.html`` in the run directory.
+    origins
+        Sources of the values of the case.
+    figures
+        Further figures by name, such as that of the spread of the run.
+    largest
+        The file has fewer bytes than this; the player of a run of many beads therefore shows fewer
+        frames.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    InputError
+        If the file is no HTML file in an existing folder.
+    walkers.postprocess.measure.dump.DumpError
+        If a dump cannot be read.
     """
     require("report")
     path = to or directory / REPORT_NAME
     check_report(path)
-    results, motion = read_results(directory, origins), read_motion(directory)
-    title = motion.case.title or motion.case.name
+    results = read_results(directory, origins)
+    motion = read_motion(directory)
+    drawn = figures_of(results) | dict(figures)
     run = {
         "name": directory.resolve().name,
-        "title": title,
+        "title": motion.case.title or motion.case.name,
         "summary": f"{caption(motion.case)}.",
-        "shown": report_values(motion.case, results, origins),
+        "result": report_values(motion.case, results, origins),
         "manifest": read_manifest(directory),
-        "figures": {
-            name: svg_of(figure) for name, figure in {**figures_of(results), **figures}.items()
-        },
+        "figures": {name: svg_of(figure) for name, figure in drawn.items()},
     }
-    places, page = 2 * MOST_PLACES, ""
-    while not page or (len(page.encode()) >= largest and places > len(motion.radius)):
+    places = MOST_PLACES
+    page = _page(run, motion, places)
+    while len(page) >= largest and places > len(motion.radius):
         places //= 2
-        plot, times, captions = player_of(motion, places=places)
-        carried = {"player": base64.b64encode(plot.get_binary_snapshot(9)).decode()}
-        body = fill(
-            "run.html.j2",
-            run=run,
-            camera=plot.camera,
-            begin=times[0],
-            end=times[1],
-            captions=captions,
-        )
-        page = page_of(title, body, carried)
-    write_bytes(path, page.encode())
+        page = _page(run, motion, places)
+    write_bytes(path, page)
     return path
 
 
+def _page(run: Mapping[str, Any], motion: Motion, places: int) -> bytes:
+    """The page of a run, with a player of at most ``places`` beads times frames."""
+    plot, (begin, end), captions = player_of(motion, places=places)
+    values = {
+        "run": run,
+        "camera": plot.camera,
+        "begin": begin,
+        "end": end,
+        "captions": captions,
+    }
+    body = render_html("run.html.j2", values)
+    player = base64.b64encode(plot.get_binary_snapshot(9)).decode()
+    return page_of(run["title"], body, {"player": player}).encode()
+
+
 def report_values(case: Case, results: Results, origins: Origins = None) -> dict[str, Any]:
-    """Warnings and rows of a result, what of it is not computed, and parameters of its case with their origins."""
-    origins = case.origins if origins is None else origins
-    parameters = [
-        vars(source)
-        | {"range": " … ".join(map(text_of, source.range or ())), "origin": source.word}
-        for source in origins
-    ]
-    banded = has_band(results)
+    """What a report says of a result, by the names of ``pieces.html.j2``.
+
+    Parameters
+    ----------
+    case
+        The case of the result.
+    results
+        The result.
+    origins
+        Sources of the values of the case.
+
+    Returns
+    -------
+    dict
+        Warnings and rows of the result, what of it is not computed, what its band contains, and the
+        parameters of its case, of which some are guessed or uncertain.
+    """
+    if origins is None:
+        origins = case.origins
+    parameters = []
+    guessed = []
+    uncertain = []
+    for origin in origins:
+        parameter = _parameter(origin)
+        parameters.append(parameter)
+        if origin.word == "guessed":
+            guessed.append(parameter)
+        elif origin.uncertain:
+            uncertain.append(parameter)
     return {
         "warnings": results.warnings,
         "rows": rows(results),
         "not_computed": not_computed(results).text,
         "band": BAND_NOTE,
-        "fixed": fixed_values_text(fixed_values(origins)) if banded else "",
-        "guessed": [parameter for parameter in parameters if parameter["origin"] == "guessed"],
-        "uncertain": [
-            parameter for parameter in parameters if parameter["origin"].endswith("uncertain")
-        ],
+        "fixed": fixed_values_text(fixed_values(origins)) if has_band(results) else "",
+        "guessed": guessed,
+        "uncertain": uncertain,
         "parameters": parameters,
     }
 
 
+def _parameter(origin: Origin) -> dict[str, str]:
+    """A row of the table of parameters."""
+    ends = [text_of(end) for end in origin.range or ()]
+    return {
+        "key": origin.key,
+        "text": origin.text,
+        "origin": origin.word,
+        "source": origin.source,
+        "range": " … ".join(ends),
+    }
+
+
 def result_html(results: Results, origins: Origins = None) -> str:
-    """A result as an HTML fragment: table with errors and units, warnings, collapsed parameters."""
-    shown = report_values(case_of(results.directory), results, origins)
-    return fill(
-        "result.html.j2", headlines=headlines(results), shown=shown, run=results.directory.name
-    )
+    """A result as an HTML fragment: table with errors and units, warnings, collapsed parameters.
+
+    ``origins`` are the sources of the values of the case; None: as recorded in the run.
+    """
+    values = {
+        "headlines": headlines(results),
+        "result": report_values(case_of(results.directory), results, origins),
+        "run": results.directory.name,
+    }
+    return render_html("result.html.j2", values)
