@@ -25,7 +25,7 @@ def against_gravity(motion: Motion) -> FloatArray:
     upward = -np.array(motion.case.gravity_vector)
     if not upward.any():
         return np.array([0.0, 0.0, 1.0])
-    return upward / np.linalg.norm(upward)
+    return np.asarray(upward / np.linalg.norm(upward))
 
 
 def axes_toward(toward: FloatArray, upward: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ doi 10.1021/la0517639 (volume).
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -245,7 +245,7 @@ def _across(axis: FloatArray, count: int) -> FloatArray:
     return across
 
 
-def neck_triangles(count: int, grid: NeckGrid) -> IntArray:
+def neck_triangles(count: int, grid: NeckGrid) -> npt.NDArray[Any]:
     """Triangles of a number of necks, as indices of their points in the order of `neck_surfaces`.
 
     Parameters
@@ -268,5 +268,5 @@ def neck_triangles(count: int, grid: NeckGrid) -> IntArray:
     upper = np.stack([neighbour, neighbour + sides, corner + sides], 1)
     corners = np.concatenate([lower, upper])
     first_points = rings * sides * np.arange(count)
-    triangles: IntArray = (corners + first_points[:, None, None]).reshape(-1, 3)
+    triangles: npt.NDArray[Any] = (corners + first_points[:, None, None]).reshape(-1, 3)
     return triangles

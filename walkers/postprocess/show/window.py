@@ -175,7 +175,7 @@ class Window:
             return np.zeros(3)
         motion = self._scene.motion
         time = np.interp([frame], np.arange(len(motion.time)), motion.time)
-        return 1e3 * visible_displacement(motion.case.excitation, time)[0]
+        return np.asarray(1e3 * visible_displacement(motion.case.excitation, time)[0])
 
     def _move_beads(self, position: FloatArray, shift: FloatArray, frame: float) -> None:
         """Colour the beads, turn them, and move them to their positions (m) and a shift (mm)."""

@@ -365,16 +365,16 @@ def _necks(
         width = (is_bridged[frame, near] & ~is_hidden).astype(float)
         necks, _ = neck_surfaces(motion, contacts[near], ends, grid, width)
         points[frame, near] = necks if path is None else necks - path[frame]
-    points = points.reshape(len(bridges), -1, 3)
+    course = _rounded(points.reshape(len(bridges), -1, 3))
     mesh = k3d.mesh(
-        points[0].astype(np.float32),
+        points[0].reshape(-1, 3).astype(np.float32),
         neck_triangles(len(contacts), grid).astype(np.uint32),
         color=NECK_COLOUR,
         opacity=NECK_OPACITY,
         flat_shading=True,
         name="bridges",
     )
-    mesh.vertices = _series(motion, _rounded(points))
+    mesh.vertices = _series(motion, course)
     return [mesh]
 
 
