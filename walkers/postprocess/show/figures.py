@@ -371,7 +371,7 @@ class _Starts:
     angle : ndarray, shape (W,)
         Angle from this direction, rad.
     turn : ndarray, shape (W,)
-        What the angles of the table exceed those from this direction by, rad: 0 or ±π.
+        Angle in the table minus the angle from this direction, rad: 0 or ±π.
     """
 
     direction: IntArray
@@ -422,7 +422,7 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
     for axes in (distance, orientation):
         axes.axvspan(0.0, float(settled), color="0.93", zorder=0)
     if uphill:
-        paths.invert_xaxis()  # what is on the left is on the left of who goes up
+        paths.invert_xaxis()  # left in the picture is to the left of a walker that goes up
         paths.set(xlabel="across the slope, to the left (mm)", ylabel="uphill (mm)")
         distance.set_ylabel("uphill (mm)")
     start_word = "angle" if case.meets else "facing"

@@ -65,7 +65,7 @@ _GIF_SAMPLES = 6
 
 def render_film(
     directory: Path,
-    to: Path | None = None,
+    destination: Path | None = None,
     options: FilmOptions = FilmOptions(),
     *,
     on_progress: Tell | None = None,
@@ -76,7 +76,7 @@ def render_film(
     ----------
     directory
         A run directory.
-    to
+    destination
         The file, an MP4 or a GIF; None: ``film.mp4`` in the run directory.
     options
         What the film shows.
@@ -96,7 +96,7 @@ def render_film(
     WalkersError
         If ffmpeg fails.
     """
-    path = to or directory / "film.mp4"
+    path = destination or directory / "film.mp4"
     check_place(path, ".mp4", ".gif")
     is_gif = path.suffix.lower() == ".gif"
     if is_gif:

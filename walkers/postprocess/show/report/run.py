@@ -45,7 +45,7 @@ Origins = tuple[Origin, ...] | None
 
 def report_run(
     directory: Path,
-    to: Path | None = None,
+    destination: Path | None = None,
     origins: Origins = None,
     *,
     figures: Mapping[str, Figure] = {},
@@ -57,7 +57,7 @@ def report_run(
     ----------
     directory
         A run directory.
-    to
+    destination
         The file; None: ``report.html`` in the run directory.
     origins
         Sources of the values of the case.
@@ -80,7 +80,7 @@ def report_run(
         If a dump cannot be read.
     """
     require("report")
-    path = to or directory / REPORT_NAME
+    path = destination or directory / REPORT_NAME
     check_report(path)
     results = read_results(directory, origins)
     motion = read_motion(directory)
