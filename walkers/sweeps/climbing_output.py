@@ -184,7 +184,7 @@ def climbs_figure(climbs: Sequence[Mapping[str, Any]]) -> Figure:
     their exact 95 % intervals, and the number of piles that climbed.
     """
     heights = [1.0, 0.3 + len(climbs) / 6.0]
-    mosaic = [["survival", "climbs"], ["rates", "rates"]]
+    mosaic: list[Any] = [["survival", "climbs"], ["rates", "rates"]]
     figure = new_figure(TWO_COLUMNS, _ROW_HEIGHT * sum(heights))
     axes = figure.subplot_mosaic(mosaic, height_ratios=heights)
     _draw_survival(axes["survival"], climbs[0]["curve"])

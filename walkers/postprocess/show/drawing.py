@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 
 from walkers.errors import input_error
+from walkers.files import replacing
 from walkers.text import printable
 
 if TYPE_CHECKING:
@@ -186,7 +187,7 @@ def save_figure(
     written = []
     for name in formats:
         place = path.with_suffix(f".{name}")
-        with beside(place) as new:
+        with replacing(place) as new:
             styled(figure.savefig)(new, format=name, metadata=metadata[name])
         written.append(place)
     return written

@@ -20,6 +20,7 @@ import numpy as np
 from walkers.arrays import FloatArray, IntArray
 from walkers.errors import WalkersError, input_error
 from walkers.extras import require
+from walkers.files import replacing
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.show.camera import camera_axes, from_above, named_direction
 from walkers.postprocess.show.drawing import check_place
@@ -109,7 +110,7 @@ def render_film(
     scene = _scene_of(motion, times, options)
     bridges = bridges_at(motion, times.frame)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with closing(Window(scene, options.size)) as window, beside(path) as new:
+    with closing(Window(scene, options.size)) as window, replacing(path) as new:
         captions = _Captions(scene, times, window.pixels_per_mm, options.size)
         film = _Film(window, captions, times, bridges)
         if is_gif:

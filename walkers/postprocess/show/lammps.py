@@ -12,7 +12,7 @@ import numpy as np
 
 from walkers.arrays import FloatArray
 from walkers.errors import check_limits
-from walkers.files import beside
+from walkers.files import replacing
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.show.drawing import check_place
 
@@ -66,7 +66,7 @@ def write_trajectory(
     ids = np.arange(count) + 1
     labels = np.column_stack([ids, types, motion.walker_of + 1, _MM * motion.radius])
     path.parent.mkdir(parents=True, exist_ok=True)
-    with beside(path) as new, new.open("w", encoding="ascii") as file:
+    with replacing(path) as new, new.open("w", encoding="ascii") as file:
         for frame, time in enumerate(motion.time):
             step = round(float(time) / motion.case.run.time_step)
             file.write(f"ITEM: TIMESTEP\n{step}\n")

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.arrays import FloatArray, IntArray
-from walkers.postprocess.measure.motion import between, visible_displacement
+from walkers.postprocess.measure.motion import interpolated_positions, visible_displacement
 from walkers.postprocess.show.meshes import beach_ball, floor_lines, mesh_of, round_below, walls_of
 from walkers.postprocess.show.necks import (
     NECK_COLOUR,
@@ -167,7 +167,9 @@ class Window:
         fraction = frame - number
         if not fraction:
             return np.asarray(motion.position[number])
-        return np.asarray(between(motion.select(slice(number, number + 2)), fraction)[0])
+        return np.asarray(
+            interpolated_positions(motion.select(slice(number, number + 2)), fraction)[0]
+        )
 
     def _shift_at(self, frame: float) -> FloatArray:
         """Displacement of the boundary in the view at a time, mm, shape (3,)."""
