@@ -85,14 +85,12 @@ def show(
 
 
 def _show_theory(case: str, lookup: LookupOptions, as_json: bool) -> None:
+    """Print the prediction of the theory, beside the result of the run if there is one."""
     from walkers.theory.prediction_text import prediction_text
 
     prediction = walkers.predict(case, lookup.out, lookup.values)
-    print_as(
-        as_json,
-        lambda: prediction,
-        lambda: prediction_text(prediction, prediction["engine"]),
-    )
+    result_of_run = prediction["engine"]
+    print_as(as_json, lambda: prediction, lambda: prediction_text(prediction, result_of_run))
 
 
 def _number_of_draws(spread: bool, points: int | None) -> int:

@@ -264,13 +264,13 @@ def expand(
     InputError
         If the sweep or the file of its base case cannot be used.
     """
-    file = validated(SweepFile, document, source, "a sweep")
+    sweep_file = validated(SweepFile, document, source, "a sweep")
     if base is None:
-        path = _base_file(file.case, source, folder)
+        path = _base_file(sweep_file.case, source, folder)
     try:
         with attributed_to(source):
-            axes = file.all_axes()
-            settings = flatten(file.set)
+            axes = sweep_file.all_axes()
+            settings = flatten(sweep_file.set)
             keys, rows = combinations(axes)
             _check_keys(settings, keys)
             if base is None:
@@ -278,23 +278,24 @@ def expand(
                 base_tables: Mapping[str, Any] = read_case(path, folder)
             else:
                 case_name, base_tables = base
+            # Meshes and records that values of the sweep name belong to the tables of a case.
             values = [*settings.items(), *_values_of_axes(axes)]
             base_tables = with_files(base_tables, folder, values)
-            tables = changed(CaseFile, base_tables, settings)
+            changed_base = changed(CaseFile, base_tables, settings)
             # Refuse keys that lead nowhere in the base case before all points are made.
-            changed(CaseFile, tables, dict(zip(keys, rows[0], strict=True)))
+            changed(CaseFile, changed_base, dict(zip(keys, rows[0], strict=True)))
     except RecursionError as error:
         raise input_error(source, "has infinitely nested tables") from error
     until_below = None
-    if file.descend:
-        until_below = file.descend.until_below
+    if sweep_file.descend:
+        until_below = sweep_file.descend.until_below
     return SweepDefinition(
         name=name,
         source=source,
         case_name=case_name,
         base=base_tables,
         file=document,
-        document=tables,
+        document=changed_base,
         axes=axes,
         rows=rows,
         until_below=until_below,

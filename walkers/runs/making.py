@@ -91,7 +91,8 @@ def make_runs(  # noqa: PLR0913
 ) -> dict[str, bool]:
     """Make the missing runs of cases, and measure them.
 
-    A single run continues where it was interrupted. Several runs are made in a shared deck.
+    A single run continues where it was interrupted. Several runs are made in a shared deck: one
+    input file, with which one process of the engine computes all cases at once.
 
     Parameters
     ----------
@@ -126,21 +127,21 @@ def make_runs(  # noqa: PLR0913
     places = {run_directory.run_place(case, engine, out): case for case in cases}
     runs: dict[str, bool] = {}
     missing: dict[Path, Case] = {}
-    with run_directory.locked(places) as ours:
-        for place in ours:
+    with run_directory.locked(places) as lock_of_place:  # without places that others have locked
+        for place in lock_of_place:
             run_directory.recover(place)
         for place, case in places.items():
             if run_directory.is_finished(place) and not force:
                 runs[place.name] = False
-            elif place in ours:
+            elif place in lock_of_place:
                 missing[place] = case
-        locks = [ours[place] for place in missing]
+        locks = [lock_of_place[place] for place in missing]
         options = _LaunchOptions(engine, locks, on_progress, time_limit)
         if len(missing) == 1:
             ((place, case),) = missing.items()
             _make_alone(case, place, options, anew=force)
             completed = [place.name]
-        else:
+        else:  # several, or none
             completed = _make_in_shared_decks(missing, out, options)
         for name in completed:
             runs[name] = True

@@ -174,13 +174,17 @@ def _remove(removal: Removal) -> str:
 
 
 def _remove_run(directory: Path) -> str:
-    """Remove a run directory under the lock of the run; return why it is left, or an empty text."""
+    """Remove a run directory under the lock of the run; return why it is left, or an empty text.
+
+    The directory is the place of the run, or one beside it of an unfinished or replaced run.
+    """
     place = place_of(directory)
-    with run_directory.locked([place]) as ours:
-        if not ours:
+    with run_directory.locked([place]) as own_locks:
+        if not own_locks:
             return _IN_PROGRESS
         run_directory.recover(place)
-        if directory.is_dir() and not directory.is_symlink():  # recovery removes what was replaced
+        # `recover` has removed the directory already if it was that of a replaced run.
+        if directory.is_dir() and not directory.is_symlink():
             (directory / MANIFEST_NAME).unlink(missing_ok=True)
             _remove_contents(directory, keep=CASE_NAME)
         _remove_directory(directory)

@@ -105,6 +105,8 @@ def law(surfaces: Surfaces) -> Curve:
     return Curve(forces, rupture=0.25 * size, formation=0.03 * size)
 
 
+_FREE_FRAMES = 100
+"""Number of frames of beads that move freely."""
 _BARE_CASE = {
     "beads": {"density": "4.0 g/cm^3"},
     "dimers": {"radii": ["0.3 mm", "0.2 mm"]},
@@ -461,15 +463,17 @@ class Setting:
             yield Line(f"{name}: {quantity}, both engines", 0.0, error, EQUAL)
 
     def _errors_of_motion(self, case: Case, scene: PlacedBodies, bench: Bench) -> dict[str, float]:
-        """Relative errors of displacement and spin of beads that move freely."""
-        sample_every = self.freely // 100
-        output = bench.run(recorded_plan(case, scene, self.freely, sample_every))
+        """Relative errors of displacement and spin of beads that move freely for some steps."""
+        steps_per_frame = self.freely // _FREE_FRAMES
+        output = bench.run(recorded_plan(case, scene, self.freely, steps_per_frame))
         start = output.frames[0, :, :3]
-        expected = output.frames[1:]
-        frames = second_engine(case, scene).run(self.freely, sample_every)
+        of_liggghts = output.frames[1:]
+        of_second_engine = second_engine(case, scene).run(self.freely, steps_per_frame)
+        displacement = of_liggghts[:, :, :3] - start
+        second_displacement = of_second_engine[..., :3] - start
         return {
-            "displacement": relative_error(expected[:, :, :3] - start, frames[..., :3] - start),
-            "spin": relative_error(expected[:, :, 6:], frames[..., 6:]),
+            "displacement": relative_error(displacement, second_displacement),
+            "spin": relative_error(of_liggghts[:, :, 6:], of_second_engine[..., 6:]),
         }
 
 

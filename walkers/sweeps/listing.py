@@ -32,13 +32,13 @@ def inventory(out: Path) -> list[ListEntry]:
         sizes[run.name] += run.size
     sweeps = []
     for path in folders_in(out):
-        sweep = _sweep(path, sizes)
+        sweep = _entry_of_sweep(path, sizes)
         if sweep is not None:
             sweeps.append(sweep)
     return [*sweeps, *runs]
 
 
-def _sweep(path: Path, sizes: Mapping[str, int]) -> ListEntry | None:
+def _entry_of_sweep(path: Path, sizes: Mapping[str, int]) -> ListEntry | None:
     """The sweep in a directory; None if there is none, or its record cannot be read.
 
     Parameters

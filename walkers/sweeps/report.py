@@ -70,11 +70,17 @@ def report_sweep(table: SweepTable, path: Path) -> Path:
 
 
 def _uncertain_values(table: SweepTable) -> list[dict[str, Any]]:
-    """The uncertain values of the runs, without those that the sweep varies."""
+    """The uncertain values on which the runs rest, without those that the sweep varies.
+
+    Each is a dict with the ``key``, the value and its range
+    (`walkers.postprocess.measure.uncertainty.uncertain_values`). What a sweep does not vary is the
+    same in all of its runs, so that one entry for each key is enough.
+    """
+    varied_keys = table.frame.columns
     values = {}
     for result in table.results.values():
         for value in result.about["rests_on"]:
-            if value["key"] not in table.frame:
+            if value["key"] not in varied_keys:
                 values[value["key"]] = value
     return list(values.values())
 

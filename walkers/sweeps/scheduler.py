@@ -242,6 +242,13 @@ def plan_sweep(
     """Resolve the points of a sweep and find the missing ones; nothing is written.
 
     The arguments are those of `run_sweep`.
+
+    Raises
+    ------
+    InputError
+        If a point cannot be resolved, or the sweep descends without walkers.
+    WalkersError
+        If there is no engine (`find_engine`).
     """
     check_utf8(out.absolute())
     binary = find_engine(engine)
@@ -255,8 +262,9 @@ def plan_sweep(
     if options.site is not None:
         check_path(record.directory)
     point_states = states(record)
-    final = _recorded_failures(record, point_states, options.final)
-    settled = {failure.point for failure in final}
+    recorded_failures = _recorded_failures(record, point_states, options.final)
+    # Points that need no run: those that have failed for good, and the finished ones.
+    settled = {failure.point for failure in recorded_failures}
     statuses = []
     for point, state in enumerate(point_states):
         statuses.append(state.status)
@@ -269,7 +277,7 @@ def plan_sweep(
         decks=_missing_decks(cases, settled, options),
         statuses=statuses,
         options=options,
-        final=final,
+        final=recorded_failures,
     )
 
 

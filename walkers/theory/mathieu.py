@@ -119,13 +119,21 @@ def alignment(case: Case) -> Alignment:
 
 
 def _multipliers(slopes: FloatArray, step: float) -> npt.NDArray[np.complex128]:
-    """Floquet multipliers of dx/dt = A(t) x; A at each step, shape (steps, n, n)."""
+    """Floquet multipliers of dx/dt = A(t) x, shape (n,).
+
+    Parameters
+    ----------
+    slopes
+        A, constant in each of the equal steps of a period, shape (steps, n, n).
+    step
+        Length of a step, in the unit of t.
+    """
     from scipy.linalg import expm
 
-    period = np.eye(slopes.shape[-1])
-    for change in expm(slopes * step):
-        period = change @ period
-    return np.linalg.eigvals(period).astype(np.complex128)
+    propagator = np.eye(slopes.shape[-1])  # x(t + period) = propagator · x(t)
+    for propagator_of_step in expm(slopes * step):
+        propagator = propagator_of_step @ propagator
+    return np.linalg.eigvals(propagator).astype(np.complex128)
 
 
 def time_to_turn(rate: float) -> float:

@@ -66,12 +66,12 @@ class FlatFaces:
             self.neighbours_of[second].append(first)
 
     def grown(self) -> tuple[IntArray, dict[int, Plane]]:
-        """Let faces grow, from the largest triangles on.
+        """Let faces grow, from the largest triangles on. Call it once.
 
         Returns
         -------
         faces : ndarray, shape (T,)
-            Number of the face of each triangle: that of the largest triangle in it.
+            Number of the face of each triangle. A face has the number of its largest triangle.
         planes : dict of int to Plane
             Planes of the faces by their numbers.
         """
@@ -84,7 +84,9 @@ class FlatFaces:
             for _ in range(_MOST_FITS):
                 if len(members) == 1:
                     break
-                # The plane of all members is more exact than that of the first triangle.
+                # The plane through all members is more exact than that of the first triangle.
+                # It replaces the plane only if that adds triangles: faces that are exactly flat
+                # keep the plane of their largest triangle.
                 fitted_plane = self._fitted_plane(members, plane.normal)
                 more_members = self._connected(seed, fitted_plane)
                 if len(more_members) <= len(members):

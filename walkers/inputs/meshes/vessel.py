@@ -435,7 +435,8 @@ class Vessel:
         ndarray, shape (n,)
             Distances in m, negative outside of the vessel and in bodies.
         """
-        below = places[:, 2] < self.height
+        # These distances are positive on the side of the beads.
+        below = places[:, 2] < self.height  # the lowest point of the rim
         inside = np.zeros(len(places), dtype=bool)
         inside[below] = evaluated(self._distance_from_closed, places[below]) > 0.0
         for rim in self.rims:

@@ -465,13 +465,24 @@ def _spline(rows: FloatArray, *, repeats: bool = False) -> PPoly:
 
 
 def _without_offset(rows: FloatArray, *, repeats: bool = False) -> PPoly:
-    """The spline of the acceleration through rows, shape (N, 4), without its offset."""
+    """The spline of the acceleration through rows, without its mean over time.
+
+    Parameters
+    ----------
+    rows
+        Time (s) and acceleration (m/s²) along x, y and z, shape (N, 4).
+    repeats
+        Whether the record is one period of a motion. Otherwise, the mean has the weights of a Hann
+        window, because the record may begin and end anywhere in a cycle.
+    """
     spline = _spline(rows, repeats=repeats)
     length = spline.x[-1]
     if repeats:
         offset = spline.integrate(0.0, length) / length
     else:
-        offset = hann_mean(spline(np.linspace(0.0, length, 2 * len(rows) - 1)[1:-1]))
+        # The rows and the points halfway between them; the window is zero at both ends.
+        times = np.linspace(0.0, length, 2 * len(rows) - 1)[1:-1]
+        offset = hann_mean(spline(times))
     spline.c[-1] -= offset
     return spline
 

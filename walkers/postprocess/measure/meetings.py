@@ -70,8 +70,11 @@ def measure(motion: Motion) -> Measurement:
     Returns
     -------
     Measurement
-        The table ``meetings`` and the numbers of the group ``meetings``. Walkers that are joined in
-        the first frame merge at that time.
+        The table ``meetings``, with a row for each time that two walkers merged or parted, and the
+        numbers of the group ``meetings``. Walkers that are joined in the first frame merge at that
+        time. The columns are ``event`` (``merged`` or ``parted``), ``time`` (s), the numbers of
+        both walkers (``walker``, ``other``), the ``size`` of the cluster of the first one after
+        the event, and the ``angle`` between their headings (rad).
     """
     centre, heading = centres_and_headings(motion)
     frames = np.array([bridges.frame for bridges in motion.bridges])
@@ -98,26 +101,27 @@ def measure(motion: Motion) -> Measurement:
     table["time"] = motion.time[frame_of_event]
     table["angle"] = np.arccos(np.clip(cosine, -1.0, 1.0))
 
-    merged = int(np.sum(table["event"] == "merged"))
+    mergers = int(np.sum(table["event"] == "merged"))
     numbers = {
-        "merged": merged,
-        "parted": len(frame_of_event) - merged,
+        "merged": mergers,
+        "parted": len(frame_of_event) - mergers,
         "largest_group": int(size.max()),
     }
     run = motion.case.run
+    # One sample of the bridges per cycle, all at the phase of the last one, after the drive began.
     bridge_samples_per_cycle = max(1, run.samples_per_cycle // run.samples_per_bridge_sample)
-    chosen = np.arange(len(frames))[::-bridge_samples_per_cycle][::-1]  # all at the same phase
-    chosen = chosen[motion.time[frames[chosen]] >= 0.0]
-    if len(chosen) > 1:
-        chosen_frames = frames[chosen]
+    once_per_cycle = np.arange(len(frames))[::-bridge_samples_per_cycle][::-1]
+    once_per_cycle = once_per_cycle[motion.time[frames[once_per_cycle]] >= 0.0]
+    if len(once_per_cycle) > 1:
+        motion_frames = frames[once_per_cycle]
         course = TrayCourse(
-            time=motion.time[chosen_frames],
-            centre=centre[chosen_frames],
-            heading=heading[chosen_frames],
-            size=size[chosen],
-            held=held[chosen],
+            time=motion.time[motion_frames],
+            centre=centre[motion_frames],
+            heading=heading[motion_frames],
+            size=size[once_per_cycle],
+            held=held[once_per_cycle],
         )
-        numbers |= collective(course, merged, np.array(motion.case.drive_axis)[:2])
+        numbers |= collective(course, mergers, np.array(motion.case.drive_axis)[:2])
     return Measurement({"meetings": table}, numbers)
 
 

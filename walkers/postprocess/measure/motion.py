@@ -177,8 +177,9 @@ class Motion:
     def averaged(self) -> Motion:
         """Means over the F - 1 intervals between frames: positions, velocities and spins.
 
-        Velocities are displacements over time, the average over all steps. Spins are those that the
-        engine averaged, if it did; otherwise they are the mean of both ends of the interval.
+        Positions are those in the middle of an interval, velocities the displacement over its
+        duration. Spins are the averages of the engine over all steps, if it made them; otherwise
+        they are the mean of both ends. Times are those of the ends of the intervals.
         """
         if self.mean_spin is None:
             spin = (self.spin[1:] + self.spin[:-1]) / 2.0

@@ -122,7 +122,9 @@ def state(numbers: Mapping[str, Any]) -> str:
     Returns
     -------
     str
-        Such as ``at rest``, or ``stops at 0.8 g`` under a ramp; empty if the velocity says more.
+        The first that applies: ``came apart``; under a ramp the thresholds, such as ``stops at
+        0.8 g``, or that there is none; for walkers that may meet how many are slow and in clusters;
+        ``at rest`` below `REST`. Empty if the velocity says more.
     """
     if numbers.get("came_apart"):
         return "came apart"
@@ -134,7 +136,7 @@ def state(numbers: Mapping[str, Any]) -> str:
             thresholds.append(f"{verb} at {text} {unit}")
     if thresholds:
         return ", ".join(thresholds)
-    if "stops_at" in numbers:
+    if "stops_at" in numbers:  # under a ramp, with no threshold
         return "no threshold within the ramp"
     if isfinite(numbers.get("slow_share", nan)):
         walkers = numbers["walkers"]

@@ -64,7 +64,7 @@ class Panel:
     title
         The title; words in braces are filled in by the function that draws the figure.
     lines
-        Column with a value for each line; empty if each column is one line.
+        Column whose values tell which rows form a line; empty if each column is one line.
     height
         Height, inches.
     """
@@ -269,9 +269,9 @@ def _draw_panel(
         line_of_row = columns[panel.lines]
     else:
         line_of_row = np.zeros(len(columns[panel.x]), dtype=np.int64)
-    lines = np.unique(line_of_row)
+    line_values = np.unique(line_of_row)
     x_label, x_factor = axis(panel.table, panel.x)
-    for (name, line), look in zip(product(names, lines), looks, strict=True):
+    for (name, line), look in zip(product(names, line_values), looks, strict=True):
         _, y_factor = axis(panel.table, name)
         rows = line_of_row == line
         axes.plot(x_factor * columns[panel.x][rows], y_factor * columns[name][rows], **look)
@@ -380,7 +380,10 @@ class _Starts:
 
 
 def _starts(case: Case, cycles: Columns, walkers: Columns) -> _Starts:
-    """How the walkers of the tables ``cycles`` and ``walkers`` start."""
+    """How walkers start, in the order of the table ``walkers``.
+
+    The rows of cycle 0 in the table ``cycles`` have the same order.
+    """
     angle = cycles["orientation"][cycles["cycle"] == 0]
     facing = walkers["facing"]
     direction = np.ones_like(facing) if case.meets else sides(facing, angle)
@@ -432,7 +435,10 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
 
 
 def _walk_labels(case: Case, walkers: Columns, starts: _Starts) -> list[str]:
-    """Labels of walkers in the order of their numbers: start and mean velocity."""
+    """Labels of walkers in the order of their numbers: start and mean velocity.
+
+    ``starts`` has the rows of ``walkers``.
+    """
     uphill = case.goes_uphill
     velocities = walkers["axial_velocity" if uphill else "velocity"]
     degrees = np.degrees(starts.angle)
@@ -545,17 +551,19 @@ def _interpolated(
 @styled
 def paths_figure(case: Case, tables: Tables) -> Figure:
     """Draw paths of walkers that may meet, once per cycle, their beads at the end, and the edge."""
-    trajectory = tables("trajectory")
+    trajectory = tables("trajectory")  # one walker after the other
     walkers = tables("walkers")
     count = len(walkers["walker"])
     x = trajectory["x"].reshape(count, -1)
     y = trajectory["y"].reshape(count, -1)
     angle = trajectory["orientation"].reshape(count, -1)
-    strobe = slice(None, None, case.run.samples_per_cycle)
+    once_per_cycle = slice(None, None, case.run.samples_per_cycle)
+    x_per_cycle = x[:, once_per_cycle]
+    y_per_cycle = y[:, once_per_cycle]
     columns = {
-        "walker": np.repeat(walkers["walker"], x[:, strobe].shape[1]),
-        "x": x[:, strobe].ravel(),
-        "y": y[:, strobe].ravel(),
+        "walker": np.repeat(walkers["walker"], x_per_cycle.shape[1]),
+        "x": x_per_cycle.ravel(),
+        "y": y_per_cycle.ravel(),
     }
     looks = line_styles([f"walker {number}" for number in range(count)])
     for look in looks:
@@ -563,6 +571,7 @@ def paths_figure(case: Case, tables: Tables) -> Figure:
     figure, (axes,) = _draw_figure("paths", case, {"trajectory": columns}, [looks], {})
     margin = 2.0 * max(kind.length for kind in case.walkers)
     aspect = (np.ptp(y) + margin) / (np.ptp(x) + margin)
+    # Height for the legend and the labels, and for axes that are neither flat nor very high.
     figure.set_figheight(0.9 + 0.7 * TWO_COLUMNS * min(1.2, max(0.3, aspect)))
     axes.plot(1e3 * x[:, 0], 1e3 * y[:, 0], "o", color=_GREY, mfc="none", ms=2.5, mew=0.6)
     for row, number in enumerate(walkers["walker"]):

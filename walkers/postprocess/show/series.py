@@ -246,9 +246,13 @@ class _Layout:
 
 
 def _series_figure(motion: Motion, frames: Sequence[int], *, follow: bool) -> Figure:
-    """Pictures of frames with axes in mm; the view may ``follow`` the beads."""
+    """Pictures of frames with axes in mm; the view may ``follow`` the beads.
+
+    Views that follow the beads have axes of their own: they stand below each other if they are wide,
+    beside each other if they are high.
+    """
     scene = _scene_of(motion, follow=follow)
-    width, height = (scene.high - scene.low)[:2].tolist()
+    width, height = (scene.high - scene.low)[:2].tolist()  # mm
     if not follow:
         layout = _largest_layout(len(frames), width, height)
     elif width >= height:

@@ -372,11 +372,11 @@ class _Copies:
         centres : ndarray, shape (N, 3)
             Centres, mm.
         rotations : ndarray, shape (N, 3, 3)
-            Rotation matrices; None: no rotation.
+            Rotation matrices; without them the copies do not turn.
         """
         if rotations is None:
             rotations = np.tile(np.eye(3), (len(centres), 1, 1))
-        # The points of a unit sphere are its normals.
+        # The points of a unit sphere are its normals; the light does not depend on those of shadows.
         normals = self._points @ np.swapaxes(rotations, 1, 2).astype(np.float32)
         points = self._radius * normals + centres[:, None].astype(np.float32)
         self._mesh.points = points.reshape(-1, 3)

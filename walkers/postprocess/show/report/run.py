@@ -160,7 +160,10 @@ def report_values(case: Case, results: Results, origins: Origins = None) -> dict
 
 
 def _parameter(origin: Origin) -> dict[str, str]:
-    """A row of the table of parameters."""
+    """A row of the table of parameters.
+
+    The ends of the range are as the case file or the library writes them, with their units.
+    """
     ends = [text_of(end) for end in origin.range or ()]
     return {
         "key": origin.key,
