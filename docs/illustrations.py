@@ -298,15 +298,19 @@ def _experiments(bench: Bench) -> Figure:
     figure = new_figure(TWO_COLUMNS, 3.2)
     phases, strengths, impacts = figure.subplots(ncols=3)
     at, fine = experiments.PHASES, np.arange(0.0, 181.0, 10.0)
-    drifts = np.array([experiments.slider(bench, phase) for phase in at])
-    curves = np.array([experiments.modelled(phase) for phase in fine])
+    drifts = np.array([experiments.measured_drift(bench, phase) for phase in at])
+    curves = np.array([experiments.coulomb_drift(phase) for phase in fine])
     for number, strength in enumerate(experiments.STRENGTHS):
         phases.plot(at, drifts[:, number], "o", mfc="none", ms=4.0, color=f"C{number}")
         phases.plot(
             fine, curves[:, number], lw=1.0, color=f"C{number}", label=f"a = {strength:g} · 7/2 μg"
         )
     phases.plot(
-        fine, [experiments.weak(phase) for phase in fine], "k--", lw=1.0, label="weak friction"
+        fine,
+        [experiments.weak_friction_drift(phase) for phase in fine],
+        "k--",
+        lw=1.0,
+        label="weak friction",
     )
     for number, phase in enumerate((0.0, 90.0)):
         of, curve = (
@@ -325,16 +329,16 @@ def _experiments(bench: Bench) -> Figure:
         strengths.plot(experiments.STRENGTHS, curve, lw=1.0, color=f"C{number}")
     for label, how in (
         ("70 GPa", {}),
-        ("70 GPa, bridge from the film on", {"law": f"{experiments.__file__}:filmed"}),
+        ("70 GPa, bridge from the film on", {"law": f"{experiments.__file__}:law_with_film"}),
         ("50 MPa", {"modulus": 5e7}),
     ):
         stokes, e = experiments.restitutions(bench, **how)
         impacts.plot(1.0 / stokes[:, 2], e[:, 2], "o-", mfc="none", ms=4.0, lw=1.0, label=label)
     inverse = np.array([0.0, 1.0 / stokes[:, 2].min()])
-    loss = np.log(experiments.FILM / experiments.ROUGH) * inverse
+    loss = np.log(experiments.FILM / experiments.ROUGHNESS) * inverse
     impacts.plot(
         inverse,
-        experiments.RESTITUTION * (1.0 - loss),
+        experiments.DRY_RESTITUTION * (1.0 - loss),
         "k--",
         lw=1.0,
         label="lubrication, approach",
@@ -442,8 +446,8 @@ def facts(docs: Path) -> dict[str, str]:
     by_frequency = {row["of"]: row["by_frequency"] for row in compared["curve"]}
     numbers["by_frequency_5g"] = f"{by_frequency['Fig. 2, 5 g']:.2f}"
     checked = read_json(docs / CHECKED)["lines"]
-    numbers |= tables.of_calibration(read_json(docs / "figures" / "calibration.json"))
-    return {**numbers, **_of_checks(checked), **dict(tables.cells(docs / "figures"))}
+    numbers |= tables.calibration_numbers(read_json(docs / "figures" / "calibration.json"))
+    return {**numbers, **_of_checks(checked), **dict(tables.cell_texts(docs / "figures"))}
 
 
 def _of_checks(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:

@@ -77,7 +77,7 @@ def markdown(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     )
 
 
-def cells(folder: Path) -> Iterator[tuple[str, str]]:
+def cell_texts(folder: Path) -> Iterator[tuple[str, str]]:
     """Names and texts of all cells of the pages that `page` wrote: of the file, the row and the column."""
     for file in sorted(folder.glob("*.md")):
         lines = [
@@ -98,7 +98,7 @@ def _name(*words: str) -> str:
     return "_".join(re.findall(r"\w+", " ".join(words).lower()))
 
 
-def of_calibration(record: Mapping[str, Any]) -> dict[str, str]:
+def calibration_numbers(record: Mapping[str, Any]) -> dict[str, str]:
     """Numbers of ``calibration.json``: agreeing facts and values by set, intervals, and what was predicted."""
     numbers = {"calibration_sets": str(record["number"])}
     for name, agree in record["agree"].items():

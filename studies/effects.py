@@ -94,7 +94,7 @@ def _curved(case: Case) -> FloatArray:
 
 
 def _parts(case: Case, effect: Effect) -> tuple[FloatArray, FloatArray]:
-    """Parameters of `acts` for a case, and losses of the loads of its contacts, in units of 4πγR̄."""
+    """Parameters of `effect_terms` for a case, and losses of the loads of its contacts, in units of 4πγR̄."""
     dimer, liquid, loads = dimer_of(case), case.liquid.of_bridges, contact_loads(case)
     tension, radii, curved = liquid.surface_tension, np.array(dimer.radii), _curved(case)
     wetted = (
@@ -122,7 +122,7 @@ def _common(edges: FloatArray, apart: float) -> float:
     return float(edges**2 @ np.arccos(parts / edges) - apart * sqrt(edges[0] ** 2 - parts[0] ** 2))
 
 
-def acts(
+def effect_terms(
     sliding: tuple[float, float, float], normal: FloatArray, friction: FloatArray, terms: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """The effects in the motion (`walkers.theory.motion.predict_motion`), to be compiled."""
@@ -144,10 +144,10 @@ def acts(
 
 @cache
 def _compiled() -> Callable[..., Any]:
-    """`acts` as the theory calls it, compiled once."""
+    """`effect_terms` as the theory calls it, compiled once."""
     from numba import njit
 
-    compiled: Callable[..., Any] = njit(acts)
+    compiled: Callable[..., Any] = njit(effect_terms)
     return compiled
 
 

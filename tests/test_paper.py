@@ -13,7 +13,14 @@ from scipy.integrate import solve_ivp
 from studies.paper.comparison import _text_of, compare
 from studies.paper.figures import theory_of_cycles
 from studies.paper.make import FIGURES, make_figures
-from studies.paper.sources import NothingFinishedError, Sources, of_facts, ruby, sets, sweep_of
+from studies.paper.sources import (
+    NothingFinishedError,
+    Sources,
+    facts_sweep_name,
+    parameter_sets,
+    ruby,
+    sweep_of,
+)
 from tests.printed import letters, spoilt
 from walkers.arrays import FloatArray
 from walkers.calibration.observations import quantities_of_run
@@ -43,7 +50,7 @@ FEWER: dict[str, dict[str, Any]] = {
     "fig4": {},
     "alignment": {"dimers.angle": ["0 deg", "15 deg"]},
 }
-FACTS = [*map(of_facts, sets())]
+FACTS = [*map(facts_sweep_name, parameter_sets())]
 
 
 @pytest.fixture(scope="session")
@@ -70,7 +77,7 @@ def sources(once: Callable[[str, Callable[[Path], object]], Path]) -> Sources:
             given = {"case": "fig1b", "set": {**SHORT, "dimers.replicates": 1}, "zip": [columns]}
             sweep = expand(given, source=name, name=name, folder=out)
             write_record(plan_sweep(sweep, out, SweepOptions(1)).record)
-            if name == of_facts("shipped"):  # the other sets have what they share with it
+            if name == facts_sweep_name("shipped"):  # the other sets have what they share with it
                 assert not run_sweep(sweep, out, SweepOptions(2))[1]
 
     return Sources(once("paper", run))
@@ -113,7 +120,9 @@ def test_theory_says_where_the_paper_measured_nothing(
 
 
 def test_what_is_called_shipped_is_that_of_the_shipped_cases() -> None:
-    cases = dict(zip(ruby().experiments, sweep_of(of_facts("shipped")).cases(), strict=True))
+    cases = dict(
+        zip(ruby().experiments, sweep_of(facts_sweep_name("shipped")).cases(), strict=True)
+    )
     names = {"walks": "fig1b", "fig4a": "fig4a", "fig4b": "fig4b"}
     pairs = [(cases[name], load_case(case)) for name, case in names.items()]
     pairs.append((next(sweep_of("sensitivity").cases()), load_case("fig1b")))
@@ -130,10 +139,10 @@ def test_facts_are_judged_by_the_runs_of_their_set(
     sources: Sources, compared: dict[str, Any]
 ) -> None:
     facts = {one["name"]: one for one in compared["facts"]}
-    runs = zip(ruby().experiments, sources.table(of_facts("shipped"))["run"], strict=True)
+    runs = zip(ruby().experiments, sources.table(facts_sweep_name("shipped"))["run"], strict=True)
     found = {label: quantities_of_run(run) for label, run in runs}
     assert list(facts) == [one.name for one in ruby().file.observations]
-    assert list(compared["sets"]) == list(sets())
+    assert list(compared["sets"]) == list(parameter_sets())
     assert facts["fig4a_velocity"]["values"]["shipped"] == pytest.approx(
         found["fig4a"]["velocity"] * 1e3
     )

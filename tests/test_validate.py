@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from studies.literature import checks, experiments
-from studies.literature.benchmarks import TESTS, largest, published
+from studies.literature.benchmarks import TESTS, largest_difference, published
 from studies.literature.bridges import LAWS, pulls
 from tests.conftest import call
 from walkers.inputs.reading import load_case
@@ -90,9 +90,9 @@ def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
 def test_experiments_of_others_pass_where_they_are_judged(in_folder: Path) -> None:
     """A bead that is thrown, one on a wet incline; and the drift of a dry bead at one phase."""
     with experiments.workbench() as bench:
-        lines = [*experiments.thrown(bench), *experiments.incline(bench)]
-        assert experiments.slider(bench, 60.0) == pytest.approx(
-            experiments.modelled(60.0), abs=5e-3
+        lines = [*experiments.thrown_bead(bench), *experiments.incline(bench)]
+        assert experiments.measured_drift(bench, 60.0) == pytest.approx(
+            experiments.coulomb_drift(60.0), abs=5e-3
         )
     assert {line.verdict for line in lines} == {Verdict.PASS}
     assert len(lines) == 7
@@ -121,8 +121,14 @@ def test_experiments_fail_with_twice_the_friction(
     """The speed of rolling does not depend on it."""
     monkeypatch.setitem(experiments._DRY, "contact.friction.bead_wall", 2.0 * experiments.FRICTION)
     with experiments.workbench() as bench:
-        assert [line.verdict for line in experiments.thrown(bench)] == [Verdict.PASS, Verdict.FAIL]
-        assert np.abs(experiments.slider(bench, 90.0) - experiments.modelled(90.0)).max() > 0.05
+        assert [line.verdict for line in experiments.thrown_bead(bench)] == [
+            Verdict.PASS,
+            Verdict.FAIL,
+        ]
+        assert (
+            np.abs(experiments.measured_drift(bench, 90.0) - experiments.coulomb_drift(90.0)).max()
+            > 0.05
+        )
 
 
 GOOD, BAD = Line("good", 1.0, 1.05, 0.1), Line("bad", 1.0, 1.2, 0.1, check="second")
@@ -178,9 +184,9 @@ def test_a_pile_fails_if_a_bead_leaves_its_motion_in_the_first_cycle(
 
 
 def test_the_largest_difference_has_either_sign() -> None:
-    line = largest("x", np.array([0.01, -0.1, 0.02]), 0.05, np.arange(3.0))
+    line = largest_difference("x", np.array([0.01, -0.1, 0.02]), 0.05, np.arange(3.0))
     assert (line.measured, line.verdict, "at 1, " in line.quantity) == (-0.1, Verdict.FAIL, True)
-    assert largest("x", np.array([0.01, -0.04]), 0.05).verdict is Verdict.PASS
+    assert largest_difference("x", np.array([0.01, -0.04]), 0.05).verdict is Verdict.PASS
 
 
 REPORTS = Path(__file__).resolve().parents[1] / "docs" / "engine-reports"

@@ -238,7 +238,9 @@ def curve_of(key: str) -> tuple[FloatArray, FloatArray]:
     return panel.x, panel.y(TESTS[panel.test], TESTS[panel.test].after)
 
 
-def largest(title: str, away: FloatArray, tolerance: float, at: FloatArray | None = None) -> Line:
+def largest_difference(
+    title: str, away: FloatArray, tolerance: float, at: FloatArray | None = None
+) -> Line:
     """The largest of several differences, and ``at`` which of given places it is."""
     worst = int(np.argmax(np.abs(away)))
     title += "" if at is None else f": largest deviation, at {at[worst]:g}, over the axis"
@@ -248,7 +250,7 @@ def largest(title: str, away: FloatArray, tolerance: float, at: FloatArray | Non
 def benchmarks() -> Iterator[Line]:
     """The tests beside closed forms and published numbers."""
     for name, test in TESTS.items():
-        yield largest(
+        yield largest_difference(
             f"{name}, restitution", test.after.normal / test.before.normal - test.restitution, 5e-3
         )
         if len(test.before.normal) == 1 and test.restitution == 1.0:
@@ -270,7 +272,9 @@ def benchmarks() -> Iterator[Line]:
                 change = (
                     getattr(test.after, which) - getattr(test.before, which)
                 ) / test.before.normal
-                yield largest(f"{name}, change of the {which} speed over the normal", change, 1e-6)
+                yield largest_difference(
+                    f"{name}, change of the {which} speed over the normal", change, 1e-6
+                )
     panels = published()
     for key, panel in PANELS.items():
         test, slides = TESTS[panel.test], (panel.slides[0] < panel.x) & (panel.x < panel.slides[1])
@@ -279,7 +283,7 @@ def benchmarks() -> Iterator[Line]:
             panel.y(test, speeds)[slides] / axis for speeds in (test.sliding(), test.after)
         )
         title = f"{panel.test[0]}: {key}, gross sliding: largest deviation over the axis"
-        yield largest(title, values - expected, SLIDING)
+        yield largest_difference(title, values - expected, SLIDING)
     for key, figure in panels.items():
         for series in figure["series"]:
             points, judged = series["points"], series.get("judged", [-np.inf, np.inf])
@@ -287,4 +291,4 @@ def benchmarks() -> Iterator[Line]:
                 within = points[(judged[0] <= points[:, 0]) & (points[:, 0] < judged[1])]
                 title = f"{figure['title'].split()[1].rstrip(':')}: {key}, {series['name']}"
                 away = np.interp(within[:, 0], *curve_of(key)) - within[:, 1]
-                yield largest(title, away / figure["axis"], READING, within[:, 0])
+                yield largest_difference(title, away / figure["axis"], READING, within[:, 0])

@@ -43,7 +43,7 @@ from walkers.second_engine.scenes import (
 from walkers.templates.placement import Bead, PlacedBodies, loading_of, surface_of
 
 FRICTION, G = 0.2, 9.81
-SLOWS = (
+SLIDING_DECELERATION = (
     3.5 * FRICTION * G
 )  # m/s²; friction slows the surface of a solid sphere 7/2 times as much as its centre
 BASE, CYCLES, FIRST = (
@@ -54,14 +54,14 @@ BASE, CYCLES, FIRST = (
 PHASES = np.arange(0.0, 180.0, 30.0)  # of the second tone, degrees
 STRENGTHS = np.array(
     [2.0, 4.0, 8.0, 16.0]
-)  # peak acceleration of both tones over the deceleration `SLOWS`
-GLASS, FILM, ROUGH, RESTITUTION = (
+)  # peak acceleration of both tones over the deceleration `SLIDING_DECELERATION`
+GLASS, FILM, ROUGHNESS, DRY_RESTITUTION = (
     2.75e-3,
     0.45e-3,
     1e-7,
     0.97,
 )  # radius of a bead, film, roughness, m; of a dry bead
-OILS = np.array([0.25, 0.5, 1.0, 2.0, 4.0]) * 4.6e-3  # viscosities, Pa s
+VISCOSITIES = np.array([0.25, 0.5, 1.0, 2.0, 4.0]) * 4.6e-3  # viscosities, Pa s
 SPEEDS = np.array([0.25, 0.5, 1.0, 2.0])  # of impacts, m/s
 _DRY = {
     **DRY,
@@ -82,7 +82,7 @@ def experiments(out: Path) -> Iterator[Line]:
     """All lines; ``out`` is the folder of the runs of walkers."""
     yield from symmetry(out)
     with workbench() as bench:
-        for lines in (thrown, two_tones, impacts, incline):
+        for lines in (thrown_bead, two_tones, impacts, incline):
             yield from lines(bench)
 
 
@@ -104,7 +104,7 @@ def symmetry(out: Path) -> Iterator[Line]:
     yield Line(title, -1, opposite / even, 0.01)
 
 
-def followed(
+def run_beads(
     bench: Bench,
     cases: Sequence[Case],
     beads: Sequence[Bead],
@@ -125,17 +125,13 @@ def followed(
     return bench.run(recorded_plan(cases[0], scene, steps, every)).frames
 
 
-def thrown(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
+def thrown_bead(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
     """A dry bead that is thrown sliding rolls at 5/7 of its speed after 2v/7μg."""
-    case, ends = bench_case(_DRY), speed / SLOWS
-    bead = bead_at_plane(
-        BOTTOM,
-        -contact_loads(case)[0].overlap,
-        LARGE_RADIUS,
-        velocity=(speed, 0.0, 0.0),
-        spin=AT_REST,
-    )
-    frames = followed(bench, [case], [bead], 10 * round(0.15 * ends / case.run.time_step), 10)[:, 0]
+    case, ends = bench_case(_DRY), speed / SLIDING_DECELERATION
+    bead = over(BOTTOM, -contact_loads(case)[0].overlap, LARGE_RADIUS, (speed, 0.0, 0.0), AT_REST)
+    frames = run_beads(bench, [case], [bead], 10 * round(0.15 * ends / case.run.time_step), 10)[
+        :, 0
+    ]
     slip, time = (
         frames[:, 3] - LARGE_RADIUS * frames[:, 7],
         10.0 * case.run.time_step * np.arange(len(frames)),
@@ -156,7 +152,7 @@ def thrown(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
     )
 
 
-def glide(phase: float, angle: FloatArray | float) -> FloatArray:
+def frictionless_velocity(phase: float, angle: FloatArray | float) -> FloatArray:
     """Velocity by two tones, at a phase of the cycle (rad), without friction; over the speed of the first tone.
 
     Tones have the frequencies 1:2 and equal accelerations; ``phase`` is the phase of the second tone, degrees.
@@ -164,35 +160,45 @@ def glide(phase: float, angle: FloatArray | float) -> FloatArray:
     return np.asarray(-np.cos(angle) - 0.5 * np.cos(2.0 * np.asarray(angle) + radians(phase)))
 
 
-def weak(phase: float) -> float:
+def weak_friction_drift(phase: float) -> float:
     """Drift in the limit of weak friction, in which a slider slides forward as long as backward."""
-    return -float(np.median(glide(phase, np.linspace(0.0, 2.0 * pi, 20_000, endpoint=False))))
+    return -float(
+        np.median(frictionless_velocity(phase, np.linspace(0.0, 2.0 * pi, 20_000, endpoint=False)))
+    )
 
 
-def modelled(phase: float, steps: int = 2500) -> FloatArray:
-    """Drift of a mass with Coulomb friction, which can stop it at the end of a step; shape and unit as in `slider`."""
+def coulomb_drift(phase: float, steps: int = 2500) -> FloatArray:
+    """Drift of a mass with Coulomb friction, which can stop it at the end of a step; shape and unit as in `measured_drift`."""
     step, displacement = 2.0 * pi / steps, np.zeros_like(STRENGTHS)
-    slip = glide(phase, 0.0) + weak(phase) + displacement
+    slip = frictionless_velocity(phase, 0.0) + weak_friction_drift(phase) + displacement
     for number in range(CYCLES * steps):
-        slip = slip + glide(phase, (number + 1) * step) - glide(phase, number * step)
+        slip = (
+            slip
+            + frictionless_velocity(phase, (number + 1) * step)
+            - frictionless_velocity(phase, number * step)
+        )
         slip = np.sign(slip) * np.maximum(np.abs(slip) - step / STRENGTHS, 0.0)
         displacement += slip * (number >= FIRST * steps)
     return displacement / ((CYCLES - FIRST) * steps)
 
 
-def slider(bench: Bench, phase: float) -> FloatArray:
+def measured_drift(bench: Bench, phase: float) -> FloatArray:
     """Mean sliding velocity of a dry bead on the plate by `STRENGTHS`, over the speed of the first tone.
 
     Its surface moves as a slider with 7/2 times the friction. It starts at the velocity of the limit of weak friction.
     """
-    plain, start, drift = bench_case(_DRY), float(glide(phase, 0.0)), weak(phase)
-    speeds = SLOWS * STRENGTHS / (2.0 * pi * BASE)
+    plain, start, drift = (
+        bench_case(_DRY),
+        float(frictionless_velocity(phase, 0.0)),
+        weak_friction_drift(phase),
+    )
+    speeds = SLIDING_DECELERATION * STRENGTHS / (2.0 * pi * BASE)
     gap, steps, cases = (
         -contact_loads(plain)[0].overlap,
         round(1.0 / BASE / plain.run.time_step),
         [],
     )
-    for peak in SLOWS * STRENGTHS:
+    for peak in SLIDING_DECELERATION * STRENGTHS:
         tones = (BASE, 0.0), (2.0 * BASE, radians(phase))
         sines = (
             Harmonic(axis="x", frequency=tone, peak_acceleration=peak, phase=angle)
@@ -213,14 +219,15 @@ def slider(bench: Bench, phase: float) -> FloatArray:
         )
         for speed in speeds.tolist()
     ]
-    frames = followed(bench, cases, beads, CYCLES * steps, 50)[1 + FIRST * steps // 50 :]
+    frames = run_beads(bench, cases, beads, CYCLES * steps, 50)[1 + FIRST * steps // 50 :]
     return np.asarray((frames[..., 3] - LARGE_RADIUS * frames[..., 7]).mean(axis=0) / speeds)
 
 
 def two_tones(bench: Bench) -> Iterator[Line]:
     """Drift of a dry bead by two tones, beside the friction model and limits."""
     drifts, expected = (
-        np.array([drift(phase) for phase in PHASES]) for drift in (partial(slider, bench), modelled)
+        np.array([drift(phase) for phase in PHASES])
+        for drift in (partial(measured_drift, bench), coulomb_drift)
     )
     title = "dry bead, two tones"
     away = float(np.abs(drifts - expected).max())
@@ -230,7 +237,9 @@ def two_tones(bench: Bench) -> Iterator[Line]:
         away,
         5e-3,
     )
-    yield Line(f"{title} in phase, weak friction: drift", weak(0.0), drifts[0, -1], 0.03)
+    yield Line(
+        f"{title} in phase, weak friction: drift", weak_friction_drift(0.0), drifts[0, -1], 0.03
+    )
     for phase, growth in ((0, 2.0), (90, 1.0)):
         last = drifts[list(PHASES).index(phase), -2:] * STRENGTHS[-2:]
         yield Line(
@@ -238,7 +247,7 @@ def two_tones(bench: Bench) -> Iterator[Line]:
         )
 
 
-def filmed(surfaces: Surfaces) -> Curve:
+def law_with_film(surfaces: Surfaces) -> Curve:
     """The default law with bridges that form where the bead meets the surface of the film."""
     return replace(young_laplace.law(surfaces), formation=FILM)
 
@@ -246,11 +255,11 @@ def filmed(surfaces: Surfaces) -> Curve:
 def _wet(radius: float, film: float, changes: Mapping[str, Any]) -> Case:
     """A glass bead and a film, m. A bridge has the liquid that the bead displaces: it is as high as the film."""
     share = 2.0 * pi * radius * film**2 / bead_volume(radius)
-    liquid = {"liquid.volume_fraction": share, "contact.roughness.bead_wall": f"{ROUGH} m"}
+    liquid = {"liquid.volume_fraction": share, "contact.roughness.bead_wall": f"{ROUGHNESS} m"}
     bead = {
         "beads.density": "2.5 g/cm^3",
         "dimers.radii": [f"{radius} m"] * 2,
-        "contact.restitution": RESTITUTION,
+        "contact.restitution": DRY_RESTITUTION,
     }
     return bench_case({**bead, **liquid, **changes})
 
@@ -258,7 +267,7 @@ def _wet(radius: float, film: float, changes: Mapping[str, Any]) -> Case:
 def restitutions(
     bench: Bench, modulus: float = 7e10, law: str = "young-laplace"
 ) -> tuple[FloatArray, FloatArray]:
-    """Stokes numbers ρDv/9η and restitutions of glass beads of a modulus (Pa) on a wet plate, (`OILS`, `SPEEDS`)."""
+    """Stokes numbers ρDv/9η and restitutions of glass beads of a modulus (Pa) on a wet plate, (`VISCOSITIES`, `SPEEDS`)."""
     impact = Impact(2500.0 * bead_volume(GLASS), GLASS, reduced_modulus(modulus, 0.3))
     step = {"run.time_step": f"{impact.duration(SPEEDS.max()) / 100.0} s"}
     plain = _wet(
@@ -266,30 +275,30 @@ def restitutions(
     )
     cases = [
         plain.with_value_at("liquid.dynamic_viscosity", oil)
-        for oil in OILS.tolist()
+        for oil in VISCOSITIES.tolist()
         for _ in SPEEDS
     ]
     high, far = 1.001 * FILM, 1.01 * bridge_at_rest(plain, GLASS, inf).rupture
     beads = [
         bead_at_plane(BOTTOM, high, GLASS, velocity=(0.0, 0.0, -speed), spin=AT_REST)
-        for _ in OILS
+        for _ in VISCOSITIES
         for speed in SPEEDS.tolist()
     ]
     lasts = (high + 5.0 * far) / SPEEDS.min() + 2.0 * impact.duration(SPEEDS.min())
     every = round(lasts / plain.run.time_step / 200)
-    frames = followed(bench, cases, beads, 200 * every, every)
+    frames = run_beads(bench, cases, beads, 200 * every, every)
     has_left = (frames[..., 2] > GLASS + far) & (frames[..., 5] > 0.0)
     after = np.where(
         has_left.any(axis=0), frames[has_left.argmax(axis=0), range(len(beads)), 5], 0.0
     )
-    stokes = 2500.0 * 2.0 * GLASS * SPEEDS / (9.0 * OILS[:, None])
+    stokes = 2500.0 * 2.0 * GLASS * SPEEDS / (9.0 * VISCOSITIES[:, None])
     return stokes, after.reshape(stokes.shape) / SPEEDS
 
 
 def impacts(bench: Bench) -> Iterator[Line]:
     """Restitution of a glass bead on a wet plate at 1 m/s by viscosity; effects of other changes at a Stokes number."""
     (stokes, hard), (_, soft) = restitutions(bench), restitutions(bench, 5e7)
-    filled = restitutions(bench, law=f"{__file__}:filmed")[1]
+    filled = restitutions(bench, law=f"{__file__}:law_with_film")[1]
     drag, e = 1.0 / stokes[:, 2], hard[:, 2]
     slope, start = np.polyfit(drag, e, 1)
     title = "glass bead on a wet plate"
@@ -299,10 +308,10 @@ def impacts(bench: Bench) -> Iterator[Line]:
         np.abs(start + slope * drag - e).max(),
         0.02,
     )
-    yield Line(f"{title}: e at 1/St = 0, dry bead", RESTITUTION, start, 0.02)
+    yield Line(f"{title}: e at 1/St = 0, dry bead", DRY_RESTITUTION, start, 0.02)
     yield Line(
         f"{title}: critical Stokes number, ln(film/roughness) of approach",
-        log(FILM / ROUGH),
+        log(FILM / ROUGHNESS),
         -slope / start,
     )
     title += f", St = {stokes[2, 2]:.0f}: e"
@@ -333,7 +342,7 @@ def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterato
         for bead, share in zip(beads[3:], (0.9, 1.1), strict=True)
     ]
     cases = oily, oily.with_value_at("contact.friction.bead_wall", FRICTION), oily, thin, thin
-    last = followed(bench, cases, beads, 300_000, 3000, (BOTTOM, ceiling))[-1]
+    last = run_beads(bench, cases, beads, 300_000, 3000, (BOTTOM, ceiling))[-1]
     rolls, gaps = np.abs(radius * last[:, 7] / last[:, 3]), 0.02 - radius - last[:, 2]
     sliding, coupling, rolling = resistances_at_rest(oily, radius, inf)
     free = (radius * sliding + coupling) / (

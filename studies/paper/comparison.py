@@ -10,7 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from studies.paper.sources import Sources, of_facts, ruby, sets, sweep_of, thresholds_with_theory
+from studies.paper.sources import (
+    Sources,
+    facts_sweep_name,
+    parameter_sets,
+    ruby,
+    sweep_of,
+    thresholds_with_theory,
+)
 from walkers.calibration.observations import LEAST_SPEED, Observation, quantities_of_runs
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
@@ -38,10 +45,10 @@ def compare(sources: Sources) -> dict[str, Any]:
     """
     experiments = list(ruby().experiments)
     cases = {
-        name: dict(zip(experiments, sweep_of(of_facts(name)).cases(), strict=True))
-        for name in sets()
+        name: dict(zip(experiments, sweep_of(facts_sweep_name(name)).cases(), strict=True))
+        for name in parameter_sets()
     }
-    tables = {name: sources.table(of_facts(name)) for name in sets()}
+    tables = {name: sources.table(facts_sweep_name(name)) for name in parameter_sets()}
     numbers = {
         name: dict(zip(experiments, quantities_of_runs(table), strict=True))
         for name, table in tables.items()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from studies.paper.sources import Sources, described, ruby, thresholds_with_theory
+from studies.paper.sources import Sources, case_title, ruby, thresholds_with_theory
 from walkers.arrays import FloatArray
 from walkers.postprocess.measure.gait import gait
 from walkers.postprocess.show.camera import axes_toward
@@ -84,11 +84,11 @@ def fig1b(sources: Sources) -> Figure:
         panel.grid(visible=False)
     axes[-1].set_xlabel("along the shaking axis,\nfrom the centre of mass at the start (mm)")
     letter_panels(axes)
-    figure.suptitle(f"{described(case)}\nan image every {cycles} cycles")
+    figure.suptitle(f"{case_title(case)}\nan image every {cycles} cycles")
     return figure
 
 
-def of_sweep(sources: Sources, name: str, **options: Any) -> Figure:
+def draw_sweep(sources: Sources, name: str, **options: Any) -> Figure:
     """The figure of a sweep as `walkers plot` draws it."""
     chosen = FigureOptions(**options)
     sources.finished(name)
@@ -98,7 +98,7 @@ def of_sweep(sources: Sources, name: str, **options: Any) -> Figure:
 
 def fig3(sources: Sources) -> Figure:
     """Velocity against asymmetry at Γ0 = 0.5."""
-    figure = of_sweep(sources, "fig3", x="sin_delta", hue="dimers.radii", theory=True)
+    figure = draw_sweep(sources, "fig3", x="sin_delta", hue="dimers.radii", theory=True)
     figure.axes[0].autoscale(axis="y")  # the paper's curve too, which rises far above the walkers
     return figure
 
@@ -141,7 +141,7 @@ def fig4(sources: Sources) -> Figure:
         for _, row in table[table["liquid.name"] == liquid].iterrows():
             trajectory = sources.trajectory(row["run"])
             _draw_cycles(panel, trajectory, row, letter)
-            panel.set_title(f"{described(trajectory.case)}\n$\\Gamma_0$ = {row['gamma0']:.3g}")
+            panel.set_title(f"{case_title(trajectory.case)}\n$\\Gamma_0$ = {row['gamma0']:.3g}")
         panel.plot([], [], color="0.3", lw=0.9, label=COULOMB_MODEL)
         panel.plot([], [], color="0.3", lw=1.0, ls=_MEASURED_DASHES, label="measured mean")
         legend_below(panel, title="means in mm/s")

@@ -8,8 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from studies.paper.comparison import compare
-from studies.paper.figures import fig1b, fig2_threshold, fig3, fig4, of_sweep
-from studies.paper.sources import NothingFinishedError, Sources, of_facts, sets, sweep_of
+from studies.paper.figures import draw_sweep, fig1b, fig2_threshold, fig3, fig4
+from studies.paper.sources import (
+    NothingFinishedError,
+    Sources,
+    facts_sweep_name,
+    parameter_sets,
+    sweep_of,
+)
 from walkers.errors import input_error
 from walkers.extras import require
 from walkers.files import write_bytes, write_json
@@ -35,7 +41,7 @@ class Drawing(NamedTuple):
 
 
 _FIG2 = partial(
-    of_sweep, name="fig2", x="drive.peak_acceleration", hue="drive.frequency", theory=True
+    draw_sweep, name="fig2", x="drive.peak_acceleration", hue="drive.frequency", theory=True
 )
 FIGURES = {
     "fig1b": Drawing(fig1b, ("alignment",), "Fig. 1b: strobed top views of a walker"),
@@ -47,11 +53,11 @@ FIGURES = {
     "fig4": Drawing(fig4, ("fig4",), "Fig. 4: rotation of the beads through two cycles"),
 }
 COMPARISON = "comparison"
-COMPARED = (*map(of_facts, sets()), "fig2-threshold", "fig2-ramp", "fig2", "fig3")
+COMPARED = (*map(facts_sweep_name, parameter_sets()), "fig2-threshold", "fig2-ramp", "fig2", "fig3")
 """Sweeps of the comparison."""
 
 
-class Made(NamedTuple):
+class PaperFiles(NamedTuple):
     """Written files, failed points by sweep, figures that could not be drawn, and facts that agree and all by set."""
 
     files: list[Path]
@@ -69,7 +75,7 @@ def make_figures(
     formats: Sequence[str] = FORMATS,
     engine: str | None = None,
     progress: bool | None = False,
-) -> Made:
+) -> PaperFiles:
     """Make the missing runs, draw the figures and write the comparison.
 
     Parameters
@@ -91,7 +97,7 @@ def make_figures(
 
     Returns
     -------
-    Made
+    PaperFiles
         The written files, and what is missing.
 
     Raises
@@ -126,7 +132,7 @@ def make_figures(
         files += _write_comparison(comparison, to)
         for name, facts in comparison["sets"].items():
             counts[name] = (facts["agree"], facts["of"])
-    return Made(files, failures, left_out, counts)
+    return PaperFiles(files, failures, left_out, counts)
 
 
 def _check_names(chosen: Iterable[str]) -> None:

@@ -42,20 +42,20 @@ def ruby() -> Calibration:
 
 
 @cache
-def sets() -> dict[str, Mapping[str, float] | None]:
+def parameter_sets() -> dict[str, Mapping[str, float] | None]:
     """Parameter sets to compare: the cases as they are, the sets of the calibration, and one of friction alone."""
     return {"shipped": None, **ruby().file.sets, "friction only": _FRICTION_ONLY}
 
 
-def of_facts(name: str) -> str:
+def facts_sweep_name(name: str) -> str:
     """The name of the sweep of all experiments of the calibration with a parameter set."""
     return f"facts-{name.replace(' ', '-')}"
 
 
 def sweep_of(name: str) -> SweepDefinition:
-    """A shipped sweep, or one of `of_facts`."""
-    for label, values in sets().items():
-        if name == of_facts(label):
+    """A shipped sweep, or one of `facts_sweep_name`."""
+    for label, values in parameter_sets().items():
+        if name == facts_sweep_name(label):
             row = (
                 None
                 if values is None
@@ -65,7 +65,7 @@ def sweep_of(name: str) -> SweepDefinition:
     return load_sweep(name)
 
 
-def described(case: Case) -> str:
+def case_title(case: Case) -> str:
     """Radii, drive and liquid of a case in a few words, for titles."""
     drive = f"{case.excitation.frequency:g} Hz, {case.excitation.peak_acceleration / ACCELERATION_OF_ONE_G:.3g} g"
     return f"R = {radii_text(case.walkers[0].radii)} mm, {drive}, {liquid_text(case)}"
