@@ -1,7 +1,8 @@
 """Compare our runs with the paper's measurements and statements, for each parameter set.
 
 `compare` collects the numbers of ``comparison.md`` and ``comparison.json``; `studies.paper.make`
-writes these files. Nothing is run here: the runs are in the folder of a `Sources`."""
+writes these files. Nothing is run here: the runs are in the folder of a `Sources`.
+"""
 
 from __future__ import annotations
 
@@ -142,8 +143,7 @@ def _parameter_texts(cases: Mapping[str, Case]) -> dict[str, str]:
 def _fact(
     observation: Observation, numbers: Mapping[str, Numbers], theory: Numbers
 ) -> dict[str, Any]:
-    """A fact beside our numbers of each parameter set and that of the theory, in the unit of the
-    fact."""
+    """A fact, our number for each parameter set, and the theory's, in the unit of the fact."""
     scale = observation.unit[1]
     values = {name: observation.number_from(of_set) for name, of_set in numbers.items()}
     scaled = {name: value * scale for name, value in values.items()}
@@ -241,8 +241,7 @@ def _curve(
 
 
 def _velocities_by_model(table: pd.DataFrame, column: str) -> pd.DataFrame:
-    """A column of the points of a sweep, and their velocities by the engine and by the models,
-    m/s."""
+    """A column of the points of a sweep, and their velocities by engine and models, m/s."""
     predictions: Mapping[str, Any] = {}
     if len(table):
         cases = [case_of(Path(run)) for run in table["run"]]
@@ -255,8 +254,7 @@ def _velocities_by_model(table: pd.DataFrame, column: str) -> pd.DataFrame:
 
 
 def _ratio_of_ends(velocities: pd.Series[float]) -> float:
-    """The last of several velocities, m/s, over the first; NaN if it is the only one, or at
-    rest."""
+    """The last velocity over the first; NaN if there is only one, or the first is too small."""
     slow = float(velocities.iloc[0])
     fast = float(velocities.iloc[-1])
     if len(velocities) < 2 or abs(slow) <= LEAST_SPEED:
