@@ -1,5 +1,6 @@
-"""The second engine, the bridge laws and LIGGGHTS beside published numbers and exact solutions.
+"""The second engine, the bridge laws and LIGGGHTS, compared with published numbers.
 
-`benchmarks` are published impacts, `bridges` published bridge laws, and `experiments` walkers and beads of others.
-`checks` lists them, with the comparison of whole runs (`walkers.second_engine.crosscheck`).
+`benchmarks` compares impacts of spheres, `bridges` bridge laws, and `experiments` the motion of
+walkers and beads. `checks` lists these comparisons, and that of whole runs by both engines
+(`walkers.second_engine.crosscheck`).
 """

@@ -1,4 +1,4 @@
-"""``python -m studies.literature`` prints published numbers beside those of the engines and the laws."""
+"""``python -m studies.literature`` prints published numbers with those of the engines and laws."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ def literature(
     out: OutOption = DEFAULT_OUT,
     as_json: JsonOption = False,
 ) -> int:
-    """Compare engine and bridge laws with published benchmarks, exact solutions and a second engine.
+    """Compare engine and bridge laws with published benchmarks, exact solutions and a second
+    engine.
 
     Parameters
     ----------
@@ -31,9 +32,8 @@ def literature(
     from walkers.inputs.bridge_laws import ExecutedLawWarning
     from walkers.second_engine.lines import as_dict, failures, lines_text, run_checks
 
-    warnings.simplefilter(
-        "ignore", ExecutedLawWarning
-    )  # the experiments have bridge laws of their own
+    # The experiments have bridge laws of their own, which need not be announced.
+    warnings.simplefilter("ignore", ExecutedLawWarning)
     lines = run_checks(LITERATURE, out, only, tell)
     print_as(as_json, lambda: as_dict(lines), lambda: lines_text(lines))
     return 1 if failures(lines) else 0

@@ -1,4 +1,4 @@
-"""All comparisons with the literature, by name."""
+"""The comparisons with the literature, by name."""
 
 from __future__ import annotations
 
@@ -27,4 +27,7 @@ LITERATURE: Mapping[str, Callable[[Path], Iterable[Line]]] = {
     "crosscheck": crosscheck_examples,
     "experiments": experiments,
 }
-"""Each gives its lines from the folder of runs, where missing runs are made."""
+"""Functions that give the lines of a comparison from the folder of runs.
+
+Runs that are not in the folder are made there.
+"""
