@@ -1,11 +1,12 @@
-"""What effects that the law leaves out would change, by the theory: ``python -m studies.effects`` prints the table.
+"""What effects that the bridge law leaves out would change in the theory of the dimer.
 
-docs/explanation/unexplained.md explains the effects and shows the table. SI units.
+``python -m studies.effects`` prints the table. docs/explanation/unexplained.md explains the effects
+and shows the table. SI units. Nothing here changes the law or the engine.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from math import pi, sqrt
@@ -25,29 +26,27 @@ from walkers.theory.motion import Walker, predict_motion
 COMMAND = "python -m studies.effects"
 app = new_app(COMMAND)
 
-_STEPS = 512  # per cycle; 2048 change velocities by less than 0.01 mm/s
-_LIFT = sqrt(
-    140.0
-)  # a sphere under the load N rolls at h = 140 R (η U R/N)² in a liquid that cavitates
+_STEPS_PER_CYCLE = 512
+"""Time steps of the theory; 2048 change velocities by less than 0.01 mm/s."""
+
+_LIFT = sqrt(140.0)
+"""A sphere under the load N rolls at the height h = 140 R (η U R/N)² in a liquid that cavitates."""
+
 _EDGES = 4.70 * 1.682 / 2.0
-"""Drag of the edge of a bridge over 2 r_w γ Ca^⅔: 4.70 γ Ca^⅔ per length of front and rear together, along the normal
-of an edge that moves at U cos φ; the integral of cos^(5/3) φ over half of it is 1.682."""
-_SLOW = 1e-3  # m/s; the couple of hysteresis changes its sign over this velocity
-_SHOWN = 0.05  # m/s, of the column of sizes
+"""Viscous force on the edge of a bridge over 2 r_w γ Ca^⅔.
+
+Front and rear resist with 4.70 γ Ca^⅔ per length, along the normal of an edge that moves at
+U cos φ; 1.682 is the integral of cos^(5/3) φ over half of the edge.
+"""
+
+_SLOW = 1e-3
+"""Velocity over which the couple of hysteresis changes its sign, m/s."""
+
+_VELOCITY_OF_SIZES = 0.05
+"""Velocity at which the table gives the size of an effect, m/s."""
+
 _PEAKS = (2, 3, 5, 6, 10)
-_CASES: Mapping[str, tuple[str, Mapping[str, Any]]] = {
-    **{
-        f"{peak} g, {hertz} Hz": (
-            "fig1b",
-            {"drive.peak_acceleration": f"{peak} g", "drive.frequency": f"{hertz} Hz"},
-        )
-        for peak in _PEAKS
-        for hertz in (60, 90)
-    },
-    "Fig. 3, 0.3": ("fig1b", {"drive.gamma0": 0.5}),
-    "Fig. 3, 0.4": ("fig1b", {"drive.gamma0": 0.5, "dimers.radii": ["0.4 mm", "0.2 mm"]}),
-    **{f"Fig. {name}": (f"fig{name}", {}) for name in ("4a", "4b")},
-}
+"""Peak accelerations of the walker of Fig. 2, g."""
 
 
 @dataclass(frozen=True)
@@ -55,19 +54,24 @@ class Effect:
     """An effect and its size; the defaults are the law alone."""
 
     name: str
-    lifted_above: float = 0.0  # height of asperities, m, from which the liquid lifts rolling beads
-    hysteresis: float = 0.0  # cos θ of receding edges on beads, minus that of advancing ones
-    edges: tuple[float, float] = (0.0, 0.0)  # drags on the substrate and on beads, as `_EDGES`
-    merged: bool = False  # the bridges of both beads to the substrate
-    asperities: float = 0.0  # sliding resistance of flows between asperities over 3πηR
-    friction: tuple[float, float] = (
-        1.0,
-        1.0,
-    )  # factors on that of beads with the substrate, and with each other
-    changes: Mapping[str, Any] = field(default_factory=dict)  # of keys of the cases
+    """Name in the table, with the letter of the documentation."""
+    lifted_above: float = 0.0
+    """Height of the asperities above which the liquid lifts rolling beads, m; 0: no lift."""
+    hysteresis: float = 0.0
+    """cos θ of receding edges on beads, minus that of advancing ones."""
+    edges: tuple[float, float] = (0.0, 0.0)
+    """Viscous forces on edges on the substrate and on beads, in the unit of `_EDGES`."""
+    merged: bool = False
+    """Whether the bridges of both beads to the substrate are one."""
+    asperities: float = 0.0
+    """Sliding resistance of flows between asperities, over 3πηR."""
+    friction: tuple[float, float] = (1.0, 1.0)
+    """Factors on the friction of beads with the substrate, and with each other."""
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    """Changes of the cases, by dotted keys."""
 
 
-_ALL = (_EDGES, _EDGES)
+_ALL_EDGES = (_EDGES, _EDGES)
 _WIDE = {"liquid.meniscus_radius": "150 um"}
 EFFECTS = (
     Effect("the law"),
@@ -80,65 +84,142 @@ EFFECTS = (
     Effect("(d) menisci of 20 µm", changes={"liquid.meniscus_radius": "20 um"}),
     Effect("(d) menisci of 150 µm", changes=_WIDE),
     Effect("(e) edges on the substrate", edges=(_EDGES, 0.0)),
-    Effect("(e) all edges", edges=_ALL),
-    Effect("(e) all edges, more friction", edges=_ALL, friction=(1.2, 1.1)),
-    Effect("(e) all edges, more friction, 150 µm", edges=_ALL, friction=(1.4, 1.2), changes=_WIDE),
+    Effect("(e) all edges", edges=_ALL_EDGES),
+    Effect("(e) all edges, more friction", edges=_ALL_EDGES, friction=(1.2, 1.1)),
+    Effect(
+        "(e) all edges, more friction, 150 µm",
+        edges=_ALL_EDGES,
+        friction=(1.4, 1.2),
+        changes=_WIDE,
+    ),
     Effect("(f) asperities", asperities=1.0),
     Effect("(f) asperities, ten times", asperities=10.0),
 )
+"""The rows of the table."""
 
 
-def _curved(case: Case) -> FloatArray:
-    """Reduced radii of the contacts, m."""
-    return np.array([*dimer_of(case).radii, dimer_of(case).reduced_radius])
+def _cases(changes: Mapping[str, Any]) -> dict[str, Case]:
+    """The cases of a row of the table, changed by dotted keys. The first one is a walker at 2 g."""
+    cases = {}
+    for peak in _PEAKS:
+        for frequency in (60, 90):
+            drive = {
+                "drive.peak_acceleration": f"{peak} g",
+                "drive.frequency": f"{frequency} Hz",
+            }
+            cases[f"{peak} g, {frequency} Hz"] = load_case("fig1b", {**drive, **changes})
+    force = {"drive.gamma0": 0.5}
+    cases["Fig. 3, 0.3"] = load_case("fig1b", {**force, **changes})
+    larger = {"dimers.radii": ["0.4 mm", "0.2 mm"]}
+    cases["Fig. 3, 0.4"] = load_case("fig1b", {**force, **larger, **changes})
+    cases["Fig. 4a"] = load_case("fig4a", changes)
+    cases["Fig. 4b"] = load_case("fig4b", changes)
+    return cases
 
 
-def _parts(case: Case, effect: Effect) -> tuple[FloatArray, FloatArray]:
-    """Parameters of `effect_terms` for a case, and losses of the loads of its contacts, in units of 4πγR̄."""
-    dimer, liquid, loads = dimer_of(case), case.liquid.of_bridges, contact_loads(case)
-    tension, radii, curved = liquid.surface_tension, np.array(dimer.radii), _curved(case)
-    wetted = (
-        4.0 * curved * [load.surfaces.volume for load in loads] / pi
-    ) ** 0.25  # r_w of the law
-    on_bead = wetted[:2] + wetted[2]
-    above = effect.lifted_above or np.inf
-    lifts = _LIFT * liquid.viscosity * curved * np.sqrt(curved / above)
-    couples = 2.0 * tension * effect.hysteresis * on_bead
-    edges = np.array(effect.edges)[:, None] * [wetted[:2], on_bead]
-    drags = 2.0 * tension * np.cbrt(liquid.viscosity / tension) ** 2 * edges
-    discs = 2.0 * np.sqrt(radii * liquid.meniscus_radius)
-    lost = (
-        effect.merged * tension / liquid.meniscus_radius * _common(discs, 2.0 * sqrt(radii.prod()))
-    )
-    unit = dimer.capillary_scale
-    return np.concatenate([lifts, couples, *drags]) / unit, np.array([0.5, 0.5, 0.0]) * lost / unit
+# --- the effects as terms of the theory -----------------------------------------------------------
 
 
-def _common(edges: FloatArray, apart: float) -> float:
-    """Area that two discs have in common, m²."""
-    parts = (apart**2 + edges**2 - edges[::-1] ** 2) / (2.0 * apart)
-    if edges.sum() <= apart:
+def _contact_radii(case: Case) -> FloatArray:
+    """Reduced radii of the contacts: of both beads with the substrate, and of the beads; m."""
+    dimer = dimer_of(case)
+    return np.array([*dimer.radii, dimer.reduced_radius])
+
+
+def _terms(case: Case, effect: Effect) -> FloatArray:
+    """The nine parameters of `effect_terms` for a case, over 4πγR̄."""
+    liquid = case.liquid.of_bridges
+    tension = liquid.surface_tension
+    radii = _contact_radii(case)
+    lowest_lift = effect.lifted_above or np.inf
+    lifts = _LIFT * liquid.viscosity * radii * np.sqrt(radii / lowest_lift)
+
+    volumes = np.array([load.surfaces.volume for load in contact_loads(case)])
+    wetted_radii = (4.0 * radii * volumes / pi) ** 0.25  # r_w of the law
+    wetted_on_beads = wetted_radii[:2] + wetted_radii[2]
+    couples = 2.0 * tension * effect.hysteresis * wetted_on_beads
+
+    on_substrate, on_beads = effect.edges
+    edges = np.array([on_substrate * wetted_radii[:2], on_beads * wetted_on_beads])
+    forces_on_edges = 2.0 * tension * np.cbrt(liquid.viscosity / tension) ** 2 * edges
+    return np.concatenate([lifts, couples, *forces_on_edges]) / dimer_of(case).capillary_scale
+
+
+def _lost_loads(case: Case, effect: Effect) -> FloatArray:
+    """Capillary force that the three contacts lose as bridges merge, over 4πγR̄."""
+    if not effect.merged:
+        return np.zeros(3)
+    liquid = case.liquid.of_bridges
+    dimer = dimer_of(case)
+    radii = np.array(dimer.radii)
+    menisci = 2.0 * np.sqrt(radii * liquid.meniscus_radius)
+    distance = 2.0 * sqrt(radii.prod())
+    suction = liquid.surface_tension / liquid.meniscus_radius
+    lost = suction * _common_area(menisci, distance)
+    return np.array([0.5, 0.5, 0.0]) * lost / dimer.capillary_scale
+
+
+def _common_area(radii: FloatArray, distance: float) -> float:
+    """Area that two discs have in common, m²; radii and distance of their centres in m."""
+    if radii.sum() <= distance:
         return 0.0
-    return float(edges**2 @ np.arccos(parts / edges) - apart * sqrt(edges[0] ** 2 - parts[0] ** 2))
+    to_chord = (distance**2 + radii**2 - radii[::-1] ** 2) / (2.0 * distance)
+    sectors = radii**2 @ np.arccos(to_chord / radii)
+    return float(sectors - distance * sqrt(radii[0] ** 2 - to_chord[0] ** 2))
 
 
 def effect_terms(
     sliding: tuple[float, float, float], normal: FloatArray, friction: FloatArray, terms: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The effects in the motion (`walkers.theory.motion.predict_motion`), to be compiled."""
-    along = 0.5 * (sliding[0] + sliding[1] - sliding[2])
-    spins = (along - sliding[0], along - sliding[1])  # velocities -R dφ/dt
-    entraining = (0.5 * (along + spins[0]), 0.5 * (along + spins[1]), 0.5 * (spins[0] - spins[1]))
-    friction, forces, couples = friction.copy(), np.zeros(3), np.zeros(3)
-    for at in range(3):
-        if normal[at] > 0.0:
-            friction[at] *= max(0.0, 1.0 - terms[at] * abs(entraining[at]) / normal[at])
-    for at in range(2):
-        forces[at] = terms[5 + at] * np.sign(along) * abs(along) ** (2.0 / 3.0)
-        turning = terms[7 + at] * np.sign(spins[at]) * abs(spins[at]) ** (2.0 / 3.0)
-        turning += terms[3 + at] * np.tanh(spins[at] / _SLOW)
-        couples += 0.5 * (forces[at] + turning) * np.array([1.0, 1.0, -1.0])
-        couples[at] -= forces[at] + turning
+    """Add the effects to the motion; numba compiles this function.
+
+    Contacts 1 and 2 are those of the beads with the substrate, contact 3 is that of the beads.
+
+    Parameters
+    ----------
+    sliding
+        Sliding velocities of the contacts, m/s.
+    normal
+        Normal forces of the contacts, over 4πγR̄, shape (3,).
+    friction
+        Coefficients of friction of the contacts, shape (3,).
+    terms
+        Sizes of the effects, shape (9,): lift of the contacts, couples of hysteresis on the beads,
+        forces on edges on the substrate, and on beads.
+
+    Returns
+    -------
+    friction, forces, couples
+        Coefficients of friction, forces and couples for `walkers.theory.motion.predict_motion`.
+    """
+    lifts = terms[0:3]
+    hysteresis = terms[3:5]
+    edges_on_substrate = terms[5:7]
+    edges_on_beads = terms[7:9]
+    velocity = 0.5 * (sliding[0] + sliding[1] - sliding[2])
+    spins = (velocity - sliding[0], velocity - sliding[1])  # velocities -R dφ/dt
+    entraining = (
+        0.5 * (velocity + spins[0]),
+        0.5 * (velocity + spins[1]),
+        0.5 * (spins[0] - spins[1]),
+    )
+    friction = friction.copy()
+    for contact in range(3):
+        if normal[contact] > 0.0:
+            lift = lifts[contact] * abs(entraining[contact])
+            friction[contact] *= max(0.0, 1.0 - lift / normal[contact])
+
+    forces = np.zeros(3)
+    couples = np.zeros(3)
+    for bead in range(2):
+        spin = spins[bead]
+        moved = np.sign(velocity) * abs(velocity) ** (2.0 / 3.0)
+        turned = np.sign(spin) * abs(spin) ** (2.0 / 3.0)
+        forces[bead] = edges_on_substrate[bead] * moved
+        turning = edges_on_beads[bead] * turned
+        turning += hysteresis[bead] * np.tanh(spin / _SLOW)
+        couples += 0.5 * (forces[bead] + turning) * np.array([1.0, 1.0, -1.0])
+        couples[bead] -= forces[bead] + turning
     return friction, forces, couples
 
 
@@ -151,43 +232,34 @@ def _compiled() -> Callable[..., Any]:
     return compiled
 
 
+# --- the table ------------------------------------------------------------------------------------
+
+
 def row(effect: Effect) -> dict[str, str]:
-    """The row of an effect in the table."""
-    cases = [load_case(name, {**changes, **effect.changes}) for name, changes in _CASES.values()]
-    terms, lost = map(np.array, zip(*(_parts(case, effect) for case in cases), strict=True))
-    walker = Walker.joined([Walker.of_case(case) for case in cases])
-    more = np.array([effect.friction[0], *effect.friction])[:, None]
-    resistances = walker.resistances.copy()
-    squeezed = np.array(
-        [3.0 * pi * case.liquid.of_bridges.viscosity * _curved(case) for case in cases]
-    ).T
-    resistances[0] += effect.asperities * squeezed
-    walker = replace(
-        walker,
-        friction=walker.friction * more,
-        at_rest=walker.at_rest - lost.T,
-        resistances=resistances,
-    )
+    """The row of an effect in the table: texts by the heads of the columns."""
+    cases = _cases(effect.changes)
+    all_cases = list(cases.values())
+    terms = np.array([_terms(case, effect) for case in all_cases])
+    lost = np.array([_lost_loads(case, effect) for case in all_cases])
+    walker = _walkers(all_cases, effect, lost)
     motion = predict_motion(
         walker,
-        [case.excitation.frequency for case in cases],
-        [case.excitation.peak_acceleration for case in cases],
-        steps_per_cycle=_STEPS,
+        [case.excitation.frequency for case in all_cases],
+        [case.excitation.peak_acceleration for case in all_cases],
+        steps_per_cycle=_STEPS_PER_CYCLE,
         effect=(_compiled(), terms),
     )
-    velocity = dict(zip(_CASES, 1e3 * motion.velocity, strict=True))
-    mean = {
-        peak: (velocity[f"{peak} g, 60 Hz"] + velocity[f"{peak} g, 90 Hz"]) / 2.0 for peak in _PEAKS
-    }
-    slide = effect.asperities * squeezed[0, 0] * _SHOWN / dimer_of(cases[0]).capillary_scale
-    lift, turn, drags = (
-        terms[0, 0] * _SHOWN,
-        terms[0, 3],
-        (terms[0, 5] + terms[0, 7]) * _SHOWN ** (2.0 / 3.0),
-    )
+    velocity = dict(zip(cases, 1e3 * motion.velocity, strict=True))
+    mean = {}
+    for peak in _PEAKS:
+        mean[peak] = (velocity[f"{peak} g, 60 Hz"] + velocity[f"{peak} g, 90 Hz"]) / 2.0
+    force = _force_at_large_bead(all_cases[0], effect, terms[0], lost[0])
     numbers = {
-        "size, %": 100.0 * (lift + turn + drags + slide + lost[0, 0]) / walker.at_rest[0, 0],
-        **{f"{peak} g": mean[peak] for peak in _PEAKS[:-1]},
+        "size, %": 100.0 * force / walker.at_rest[0, 0],
+        "2 g": mean[2],
+        "3 g": mean[3],
+        "5 g": mean[5],
+        "6 g": mean[6],
         "10 g / 6 g": mean[10] / mean[6],
         "Fig. 3, 0.4 / 0.3": velocity["Fig. 3, 0.4"] / velocity["Fig. 3, 0.3"],
         "4a": velocity["Fig. 4a"],
@@ -195,11 +267,46 @@ def row(effect: Effect) -> dict[str, str]:
         "4b": velocity["Fig. 4b"],
         "4b, rotation": 1e3 * motion.rotation[0, -1],
     }
-    texts = {
-        name: f"{number:.2f}" if np.isfinite(number) else "opens"
-        for name, number in numbers.items()
-    }
-    return {"mm/s": effect.name, **texts}
+    texts = {"mm/s": effect.name}
+    for head, number in numbers.items():
+        texts[head] = f"{number:.2f}" if np.isfinite(number) else "opens"
+    return texts
+
+
+def _walkers(cases: Sequence[Case], effect: Effect, lost: FloatArray) -> Walker:
+    """The walkers of N cases with the friction, loads and sliding resistances of an effect.
+
+    ``lost`` is as from `_lost_loads`, shape (N, 3).
+    """
+    walker = Walker.joined([Walker.of_case(case) for case in cases])
+    on_substrate, between_beads = effect.friction
+    factors = np.array([on_substrate, on_substrate, between_beads])
+    resistances = walker.resistances.copy()
+    resistances[0] += effect.asperities * np.array([_squeezing(case) for case in cases]).T
+    return replace(
+        walker,
+        friction=walker.friction * factors[:, None],
+        at_rest=walker.at_rest - lost.T,
+        resistances=resistances,
+    )
+
+
+def _squeezing(case: Case) -> FloatArray:
+    """The unit of `Effect.asperities`, 3πηR, at the three contacts, N s/m."""
+    return 3.0 * pi * case.liquid.of_bridges.viscosity * _contact_radii(case)
+
+
+def _force_at_large_bead(case: Case, effect: Effect, terms: FloatArray, lost: FloatArray) -> float:
+    """Force of an effect at the contact of the large bead with the substrate, over 4πγR̄.
+
+    The velocity is 50 mm/s; ``terms`` and ``lost`` are those of the case.
+    """
+    lift = terms[0] * _VELOCITY_OF_SIZES
+    couple = terms[3]
+    edges = (terms[5] + terms[7]) * _VELOCITY_OF_SIZES ** (2.0 / 3.0)
+    sliding = effect.asperities * _squeezing(case)[0] * _VELOCITY_OF_SIZES
+    sliding /= dimer_of(case).capillary_scale
+    return float(lift + couple + edges + sliding + lost[0])
 
 
 def rows() -> list[dict[str, str]]:
@@ -213,7 +320,10 @@ def effects() -> None:
     """Print what effects that the law leaves out would change: velocities by the theory, mm/s."""
     table = rows()
     heads = list(table[0])
-    print(aligned([heads, *(list(row.values()) for row in table)], right=range(1, len(heads))))
+    lines = [heads]
+    for texts in table:
+        lines.append(list(texts.values()))
+    print(aligned(lines, right=range(1, len(heads))))
 
 
 if __name__ == "__main__":
