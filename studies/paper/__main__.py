@@ -21,7 +21,7 @@ app = new_app("python -m studies.paper")
 
 
 @app.default
-def paper(
+def paper(  # noqa: PLR0913
     *,
     out: OutOption = DEFAULT_OUT,
     to: Path = Path("figures"),
@@ -30,7 +30,9 @@ def paper(
     jobs: JobsOption = None,
     engine: EngineOption = None,
 ) -> int:
-    """Draw the paper's figures with our results, and write a table of its facts. Missing runs are made first.
+    """Draw the paper's figures with our results, and write a table of its facts.
+
+    Missing runs are made first.
 
     Parameters
     ----------

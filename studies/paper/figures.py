@@ -1,14 +1,19 @@
-"""Figs. 1b, 2, 3 and 4 of the paper by engine and theory."""
+"""Figs. 1b, 2, 3 and 4 of the paper by engine and theory.
+
+Each function draws a figure from finished runs and raises
+`studies.paper.sources.NothingFinishedError` if there are none.
+"""
 
 from __future__ import annotations
 
 from contextlib import closing
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from studies.paper.sources import Sources, case_title, ruby, thresholds_with_theory
-from walkers.arrays import FloatArray
+from walkers.arrays import FloatArray, IntArray
 from walkers.postprocess.measure.gait import gait
 from walkers.postprocess.show.camera import axes_toward
 from walkers.postprocess.show.drawing import (
@@ -36,49 +41,108 @@ if TYPE_CHECKING:
 
     from walkers.postprocess.measure.motion import Group
 
-_INTERVAL, _IMAGES = 0.3, 6
-"""Fig. 1b: seconds between images, and number of images."""
+_INTERVAL = 0.3
+"""Fig. 1b: time between images, s."""
+
+_IMAGES = 6
+"""Fig. 1b: largest number of images."""
+
+_PIXELS = 120.0
+"""Fig. 1b: pixels in the radius of the smallest bead."""
+
 _CYCLES = 2
-"""Cycles of Fig. 4."""
-_SERIES = (
-    ("walker", "velocity", "s", "#c4473a", 7.5),
-    ("large bead", "rotation_1", "o", "#111111", 5.0),
-    ("small bead", "rotation_2", "^", "#1f5fa8", 2.5),
-)
-"""Fig. 4: name, column of a sweep's table, marker, colour, and size, so that none hides another."""
+"""Fig. 4: number of cycles of the drive."""
+
 _MEASURED_DASHES = (0, (6, 2, 1, 2))
+"""Fig. 4: dashes of the means that the paper measured."""
+
+
+class _Series(NamedTuple):
+    """A velocity of Fig. 4 and its look."""
+
+    name: str
+    column: str
+    """Column of its mean in the table of the sweep."""
+    marker: str
+    colour: str
+    size: float
+    """Size of the markers, points; different sizes do not hide each other."""
+
+
+_SERIES = (
+    _Series("walker", "velocity", "s", "#c4473a", 7.5),
+    _Series("large bead", "rotation_1", "o", "#111111", 5.0),
+    _Series("small bead", "rotation_2", "^", "#1f5fa8", 2.5),
+)
+
+
+# --- Fig. 1b --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Strip:
+    """What the images of Fig. 1b show, m: along the drive and across it, from above."""
+
+    centres: FloatArray
+    """Centre of mass of the walker in each image, shape (images, 2)."""
+    along: tuple[float, float]
+    """Limits along the drive, which all images have in common."""
+    half_width: float
+    """Half of the extent across the drive, around the centre of mass."""
+    height: float
+    """Height of the walker."""
+
+    def bounds(self, image: int) -> FloatArray:
+        """Limits along the drive, across it, and upward, shape (3, 2)."""
+        across = self.centres[image, 1]
+        return np.array(
+            [
+                self.along,
+                (across - self.half_width, across + self.half_width),
+                (0.0, self.height),
+            ]
+        )
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Limits on the axes of an image, mm from the centre of mass at the start."""
+        origin = float(self.centres[0, 0])
+        left = (self.along[0] - origin) * 1e3
+        right = (self.along[1] - origin) * 1e3
+        return left, right, -self.half_width * 1e3, self.half_width * 1e3
 
 
 @styled
 def fig1b(sources: Sources) -> Figure:
-    """The first asymmetric dimer of the sweep ``alignment``, from the smallest start angle: from above every 0.3 s."""
+    """Views of a walker from above, every 0.3 s.
+
+    It is the first asymmetric dimer of the sweep ``alignment``, from the smallest initial angle.
+    """
     table = sources.finished("alignment")
-    run = table[table["sin_delta"] > 0.0].sort_values("dimers.angle")["run"].iloc[0]
-    trajectory = sources.trajectory(run)
-    case, largest = trajectory.case, float(trajectory.radii.max())
+    asymmetric = table[table["sin_delta"] > 0.0].sort_values("dimers.angle")
+    trajectory = sources.trajectory(asymmetric["run"].iloc[0])
+    case = trajectory.case
     cycles = round(_INTERVAL * case.excitation.frequency)
     frames = np.arange(_IMAGES) * cycles * case.run.samples_per_cycle
     frames = frames[frames < len(trajectory.time)]
-    centre = trajectory.mass_centre[frames, 0] @ np.stack(
-        [trajectory.drive_axis, trajectory.across_axis], axis=-1
-    )
-    along = (float(centre[:, 0].min()) - 2.4 * largest, float(centre[:, 0].max()) + 2.4 * largest)
-    half, origin = 1.15 * largest, float(centre[0, 0])
-    row = 0.97 * ONE_COLUMN * 2.0 * half / (along[1] - along[0]) + 0.22
-    figure = new_figure(ONE_COLUMN, len(frames) * row + 0.75)
+    strip = _strip(trajectory, frames)
+
+    aspect = 2.0 * strip.half_width / (strip.along[1] - strip.along[0])
+    row_height = 0.97 * ONE_COLUMN * aspect + 0.22
+    height = len(frames) * row_height + 0.75
+    figure = new_figure(ONE_COLUMN, height)
     axes = figure.subplots(nrows=len(frames), sharex=True)
     motion = trajectory.motion.of_walkers(trajectory.walkers[:1])
     view = axes_toward(np.array([0.0, 0.0, 1.0]), trajectory.across_axis)
-    pixels = 120.0 / float(trajectory.radii.min())
+    pixels_per_metre = _PIXELS / float(trajectory.radii.min())
     bridges = bridges_at(motion, frames)
-    for panel, frame, (_, middle), contacts in zip(axes, frames, centre, bridges, strict=True):
-        bounds = np.array([along, (middle - half, middle + half), (0.0, 2.0 * largest)])
+    for image, (panel, frame) in enumerate(zip(axes, frames, strict=True)):
+        bounds = strip.bounds(image)
         scene = Scene(motion, view, 1e3 * bounds[:, 0], 1e3 * bounds[:, 1], shaken=False)
-        size = [round(pixels * extent) for extent in np.ptp(bounds[:2], axis=1).tolist()]
-        with closing(Window(scene, size)) as window:
-            picture = window.picture(int(frame), contacts)
-        edges = [(along[0] - origin) * 1e3, (along[1] - origin) * 1e3, -half * 1e3, half * 1e3]
-        panel.imshow(picture, extent=edges, interpolation="bilinear")
+        extents = np.ptp(bounds[:2], axis=1).tolist()
+        size = [round(pixels_per_metre * extent) for extent in extents]
+        picture = _picture(scene, size, int(frame), bridges[image])
+        panel.imshow(picture, extent=strip.extent, interpolation="bilinear")
         panel.set(yticks=[], title=f"{trajectory.time[frame]:.1f} s")
         panel.axvline(0.0, color="white", lw=0.6, ls=":")
         panel.grid(visible=False)
@@ -88,52 +152,94 @@ def fig1b(sources: Sources) -> Figure:
     return figure
 
 
-def draw_sweep(sources: Sources, name: str, **options: Any) -> Figure:
+def _strip(trajectory: Group, frames: IntArray) -> _Strip:
+    """The first walker at these frames, with space around it."""
+    horizontal = np.stack([trajectory.drive_axis, trajectory.across_axis], axis=-1)
+    centres = trajectory.mass_centre[frames, 0] @ horizontal
+    largest = float(trajectory.radii.max())
+    left = float(centres[:, 0].min()) - 2.4 * largest
+    right = float(centres[:, 0].max()) + 2.4 * largest
+    return _Strip(centres, (left, right), half_width=1.15 * largest, height=2.0 * largest)
+
+
+def _picture(scene: Scene, size: list[int], frame: int, bridges: IntArray) -> FloatArray:
+    """A picture of a frame, ``size`` pixels wide and high."""
+    with closing(Window(scene, size)) as window:
+        return window.picture(frame, bridges)
+
+
+# --- Figs. 2 and 3 --------------------------------------------------------------------------------
+
+
+def draw_sweep(sources: Sources, name: str, options: FigureOptions) -> Figure:
     """The figure of a sweep as `walkers plot` draws it."""
-    chosen = FigureOptions(**options)
     sources.finished(name)
     table = table_of(read_sweep_record(sources.out / name))
-    return figure_of(table, chosen, predicted_column if chosen.theory else None)
+    return figure_of(table, options, predicted_column if options.theory else None)
+
+
+def fig2(sources: Sources) -> Figure:
+    """Velocity against peak acceleration at several frequencies."""
+    options = FigureOptions(x="drive.peak_acceleration", hue="drive.frequency", theory=True)
+    return draw_sweep(sources, "fig2", options)
 
 
 def fig3(sources: Sources) -> Figure:
     """Velocity against asymmetry at Γ0 = 0.5."""
-    figure = draw_sweep(sources, "fig3", x="sin_delta", hue="dimers.radii", theory=True)
+    options = FigureOptions(x="sin_delta", hue="dimers.radii", theory=True)
+    figure = draw_sweep(sources, "fig3", options)
     figure.axes[0].autoscale(axis="y")  # the paper's curve too, which rises far above the walkers
     return figure
 
 
 @styled
 def fig2_threshold(sources: Sources) -> Figure:
-    """Γc between the last drive with motion and the first one without, and by the protocol of the paper, a ramp."""
+    """Threshold of motion against frequency.
+
+    Runs from rest have it between the last drive with motion and the first one without. In the
+    paper, and in another run, the drive falls until the walkers stop.
+    """
     sources.finished("fig2-threshold")
-    frequencies, low, high, theory, ramp, within = (
-        thresholds_with_theory(sources).to_numpy(dtype=float).T
-    )
+    table = thresholds_with_theory(sources).astype(float)
+    frequency = table["drive.frequency"].to_numpy()
+    at_rest = table["gamma0_at_rest"].to_numpy()
+    moving = table["gamma0_moving"].to_numpy()
+    theory = table["theory"].to_numpy()
+    ramp = table["ramp"].to_numpy()
+    within = table["within"].to_numpy()
+
     figure = new_figure(ONE_COLUMN, 2.8)
     axes = figure.subplots()
-    label = "engine: runs from rest, rest below, motion above"
     axes.errorbar(
-        frequencies, (low + high) / 2.0, (high - low) / 2.0, fmt="o", mfc="none", label=label
+        frequency,
+        (at_rest + moving) / 2.0,
+        (moving - at_rest) / 2.0,
+        fmt="o",
+        mfc="none",
+        label="engine: runs from rest, rest below, motion above",
     )
     axes.errorbar(
-        frequencies + 1.0,
+        frequency + 1.0,  # beside the other symbol
         ramp,
         within,
         fmt="s",
         mfc="none",
         label="engine: one run, the drive falls",
     )
-    axes.plot(frequencies, theory, "--", color="0.2", lw=0.9, label=COULOMB_MODEL)
+    axes.plot(frequency, theory, "--", color="0.2", lw=0.9, label=COULOMB_MODEL)
+    largest = float(np.nanmax([*moving, *theory]))
     axes.set(xlabel="frequency (Hz)", ylabel=r"threshold of motion $\Gamma_\mathrm{c}$")
-    axes.set(xticks=frequencies, ylim=(0.0, 1.3 * float(np.nanmax([*high, *theory]))))
+    axes.set(xticks=frequency, ylim=(0.0, 1.3 * largest))
     legend_below(axes)
     return figure
 
 
+# --- Fig. 4 ---------------------------------------------------------------------------------------
+
+
 @styled
 def fig4(sources: Sources) -> Figure:
-    """Velocity and rotation of the beads over two cycles: the large bead rolls, or rolls and slides."""
+    """Velocities of walker and beads over two cycles: the large bead rolls, or rolls and slides."""
     table = sources.finished("fig4")
     figure = new_figure(TWO_COLUMNS, 4.0)
     axes = figure.subplots(ncols=2)
@@ -150,33 +256,44 @@ def fig4(sources: Sources) -> Figure:
 
 
 def _draw_cycles(axes: Axes, trajectory: Group, row: pd.Series[float], letter: str) -> None:
-    """Last cycles of the first walker, with the last cycle of the theory, and the mean that the paper measured."""
+    """Draw the last cycles of the first walker, those of the theory, and the measured means.
+
+    Parameters
+    ----------
+    axes
+        A panel of Fig. 4.
+    trajectory
+        The walkers of a run.
+    row
+        The row of this run in the table of the sweep.
+    letter
+        Letter of the panel in the paper, which the names of its measurements contain.
+    """
     measured = {observation.name: observation.value for observation in ruby().file.observations}
-    run, motion = trajectory.case.run, gait(trajectory)
-    samples = run.samples_per_cycle
-    last = slice((run.cycles - _CYCLES) * samples, run.cycles * samples + 1)
-    values = [motion.velocity[last, 0], motion.rotation[last, 0, 0], motion.rotation[last, 0, 1]]
+    computed = _last_cycles(trajectory)
     theory = theory_of_cycles(trajectory)
-    for (name, column, marker, colour, size), series, line in zip(
-        _SERIES, values, theory, strict=True
-    ):
-        label = f"{name}: {row[column] * 1e3:.2f}"
-        if expected := measured.get(f"fig4{letter}_{column.removesuffix('_1')}"):
-            axes.axhline(expected * 1e3, color=colour, ls=_MEASURED_DASHES, lw=1.0)
-            label += f", measured {expected * 1e3:.1f}"
-        look: dict[str, Any] = {
-            "color": colour,
-            "ms": size,
-            "mfc": "none",
-            "mew": 0.8,
-            "label": label,
-        }
-        axes.plot(np.arange(len(series)) / samples, series * 1e3, marker, **look)
+    samples_per_cycle = trajectory.case.run.samples_per_cycle
+    for series, velocity, line in zip(_SERIES, computed, theory, strict=True):
+        label = f"{series.name}: {row[series.column] * 1e3:.2f}"
+        mean = measured.get(f"fig4{letter}_{series.column.removesuffix('_1')}")
+        if mean:
+            axes.axhline(mean * 1e3, color=series.colour, ls=_MEASURED_DASHES, lw=1.0)
+            label += f", measured {mean * 1e3:.1f}"
+        axes.plot(
+            np.arange(len(velocity)) / samples_per_cycle,
+            velocity * 1e3,
+            series.marker,
+            color=series.colour,
+            ms=series.size,
+            mfc="none",
+            mew=0.8,
+            label=label,
+        )
         axes.plot(
             np.arange(len(line)) / (len(line) - 1) * _CYCLES,
             line * 1e3,
-            color=colour,
-            lw=0.36 * size,
+            color=series.colour,
+            lw=0.36 * series.size,
         )
     axes.axhline(0.0, color="0.4", lw=0.6)
     axes.set(
@@ -185,17 +302,33 @@ def _draw_cycles(axes: Axes, trajectory: Group, row: pd.Series[float], letter: s
     )
 
 
-def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
-    """Velocity of the walker and rotation velocities of its beads by the theory, m/s, through the cycles shown.
+def _last_cycles(trajectory: Group) -> list[FloatArray]:
+    """Velocity of the first walker and rotation velocities of its beads in the last cycles, m/s."""
+    run = trajectory.case.run
+    motion = gait(trajectory)
+    end = run.cycles * run.samples_per_cycle
+    last = slice(end - _CYCLES * run.samples_per_cycle, end + 1)
+    return [motion.velocity[last, 0], motion.rotation[last, 0, 0], motion.rotation[last, 0, 1]]
 
-    Starts with a cycle of the engine's drive; NaN where a contact would open.
+
+def theory_of_cycles(trajectory: Group) -> list[FloatArray]:
+    """Velocities in the cycles of Fig. 4 by the theory.
+
+    Parameters
+    ----------
+    trajectory
+        The walkers of a run.
+
+    Returns
+    -------
+    list of ndarray
+        Velocity of the first walker and rotation velocities of its two beads, m/s. They start with
+        a cycle of the engine's drive; NaN where a contact would open.
     """
     motion = motion_of(trajectory.case)
-    sliding = (
-        motion.series[:, 0]
-        if np.isfinite(motion.velocity[0])
-        else np.full_like(motion.series[:, 0], np.nan)
-    )
+    sliding = motion.series[:, 0]
+    if not np.isfinite(motion.velocity[0]):
+        sliding = np.full_like(sliding, np.nan)
     velocity = translation(sliding)
     # Along x, the substrate accelerates as cos 2πft in the theory, and as -sin 2πft in the engine.
     quarter = sliding.shape[1] // 4

@@ -1,14 +1,14 @@
-"""All figures and the comparison, from the runs to the files."""
+"""Make the figures of the paper and the comparison with it, from the runs to the files."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from studies.paper.comparison import compare
-from studies.paper.figures import draw_sweep, fig1b, fig2_threshold, fig3, fig4
+from studies.paper.figures import fig1b, fig2, fig2_threshold, fig3, fig4
 from studies.paper.sources import (
     NothingFinishedError,
     Sources,
@@ -32,33 +32,64 @@ FORMATS = ("png", "svg")
 """Default formats of figures, from `walkers.postprocess.show.drawing`."""
 
 
-class Drawing(NamedTuple):
-    """A figure: function, sweeps and title."""
+@dataclass(frozen=True)
+class Drawing:
+    """A figure of the paper.
+
+    Attributes
+    ----------
+    draw
+        Draws the figure.
+    sweeps
+        Names of the sweeps that it shows.
+    title
+        Title in the metadata of its files.
+    """
 
     draw: Callable[[Sources], Figure]
     sweeps: tuple[str, ...]
     title: str
 
 
-_FIG2 = partial(
-    draw_sweep, name="fig2", x="drive.peak_acceleration", hue="drive.frequency", theory=True
-)
 FIGURES = {
     "fig1b": Drawing(fig1b, ("alignment",), "Fig. 1b: strobed top views of a walker"),
-    "fig2": Drawing(_FIG2, ("fig2",), "Fig. 2: velocity against peak acceleration"),
+    "fig2": Drawing(fig2, ("fig2",), "Fig. 2: velocity against peak acceleration"),
     "fig2-threshold": Drawing(
         fig2_threshold, ("fig2-threshold", "fig2-ramp"), "Fig. 2, inset: the threshold of motion"
     ),
     "fig3": Drawing(fig3, ("fig3",), "Fig. 3: velocity against asymmetry"),
     "fig4": Drawing(fig4, ("fig4",), "Fig. 4: rotation of the beads through two cycles"),
 }
+"""Figures by name."""
+
 COMPARISON = "comparison"
-COMPARED = (*map(facts_sweep_name, parameter_sets()), "fig2-threshold", "fig2-ramp", "fig2", "fig3")
+"""Name of the comparison among those of the figures."""
+
+COMPARED = (
+    *map(facts_sweep_name, parameter_sets()),
+    "fig2-threshold",
+    "fig2-ramp",
+    "fig2",
+    "fig3",
+)
 """Sweeps of the comparison."""
 
 
-class PaperFiles(NamedTuple):
-    """Written files, failed points by sweep, figures that could not be drawn, and facts that agree and all by set."""
+@dataclass(frozen=True)
+class PaperFiles:
+    """What `make_figures` has written, and what is missing.
+
+    Attributes
+    ----------
+    files
+        The written files.
+    failures
+        Failed points by sweep.
+    left_out
+        Reasons why figures could not be drawn, by figure.
+    counts
+        By parameter set, the number of facts that agree, and the number of facts.
+    """
 
     files: list[Path]
     failures: dict[str, list[Failure]]
@@ -66,7 +97,7 @@ class PaperFiles(NamedTuple):
     counts: dict[str, tuple[int, int]]
 
 
-def make_figures(
+def make_figures(  # noqa: PLR0913
     out: Path,
     to: Path,
     options: SweepOptions,
@@ -164,7 +195,8 @@ def _save(name: str, sources: Sources, to: Path, formats: Sequence[str]) -> list
 
 def _write_comparison(comparison: dict[str, Any], to: Path) -> list[Path]:
     """Write the comparison as a page and as JSON."""
-    page, record = to / f"{COMPARISON}.md", to / f"{COMPARISON}.json"
+    page = to / f"{COMPARISON}.md"
+    record = to / f"{COMPARISON}.json"
     to.mkdir(parents=True, exist_ok=True)
     write_bytes(page, rendered("studies.paper", "comparison.md.j2", comparison).encode())
     write_json(record, comparison)

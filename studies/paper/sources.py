@@ -1,8 +1,11 @@
-"""The sweeps that figures and comparison are made from, and the walkers of the paper as cases."""
+"""The sweeps that figures and comparison are made from, and the walkers of the paper as cases.
+
+Nothing is run here: `studies.paper.make` makes missing runs.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,15 +27,17 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _FRICTION_ONLY = {
-    **{
-        "friction_wall": 0.311,
-        "friction_slide": 0.311,
-        "friction_bead": 0.083,
-        "rolling_friction": 0.0035,
-    },
-    **{"roughness": 2000.0, "meniscus_radius": 40.0},
+    "friction_wall": 0.311,
+    "friction_slide": 0.311,
+    "friction_bead": 0.083,
+    "rolling_friction": 0.0035,
+    "roughness": 2000.0,
+    "meniscus_radius": 40.0,
 }
-"""Rough surfaces, so that bridges drag little: outside of the calibration's ranges, in the units of its file."""
+"""A parameter set with surfaces so rough that viscous forces are small.
+
+It is outside of the ranges of the calibration, in the units of its file.
+"""
 
 
 @cache
@@ -43,32 +48,37 @@ def ruby() -> Calibration:
 
 @cache
 def parameter_sets() -> dict[str, Mapping[str, float] | None]:
-    """Parameter sets to compare: the cases as they are, the sets of the calibration, and one of friction alone."""
+    """Parameter sets to compare, by name.
+
+    They are the shipped cases as they are (None), the sets of the calibration, and one with
+    friction alone.
+    """
     return {"shipped": None, **ruby().file.sets, "friction only": _FRICTION_ONLY}
 
 
-def facts_sweep_name(name: str) -> str:
+def facts_sweep_name(parameter_set: str) -> str:
     """The name of the sweep of all experiments of the calibration with a parameter set."""
-    return f"facts-{name.replace(' ', '-')}"
+    return f"facts-{parameter_set.replace(' ', '-')}"
 
 
 def sweep_of(name: str) -> SweepDefinition:
-    """A shipped sweep, or one of `facts_sweep_name`."""
-    for label, values in parameter_sets().items():
-        if name == facts_sweep_name(label):
-            row = (
-                None
-                if values is None
-                else np.array([[values[parameter] for parameter in ruby().file.parameters]])
-            )
-            return ruby().sweep(name, row)
+    """A shipped sweep, or the sweep of a parameter set by its name (`facts_sweep_name`)."""
+    for parameter_set, values in parameter_sets().items():
+        if name != facts_sweep_name(parameter_set):
+            continue
+        if values is None:
+            return ruby().sweep(name)
+        row = [values[parameter] for parameter in ruby().file.parameters]
+        return ruby().sweep(name, np.array([row]))
     return load_sweep(name)
 
 
 def case_title(case: Case) -> str:
     """Radii, drive and liquid of a case in a few words, for titles."""
-    drive = f"{case.excitation.frequency:g} Hz, {case.excitation.peak_acceleration / ACCELERATION_OF_ONE_G:.3g} g"
-    return f"R = {radii_text(case.walkers[0].radii)} mm, {drive}, {liquid_text(case)}"
+    drive = case.excitation
+    peak = drive.peak_acceleration / ACCELERATION_OF_ONE_G
+    radii = radii_text(case.walkers[0].radii)
+    return f"R = {radii} mm, {drive.frequency:g} Hz, {peak:.3g} g, {liquid_text(case)}"
 
 
 class NothingFinishedError(WalkersError):
@@ -76,19 +86,29 @@ class NothingFinishedError(WalkersError):
 
 
 class Sources:
-    """Sweeps in a folder: ``table`` gives the table of one by its name, ``trajectory`` the first kind of a run."""
+    """The sweeps and runs in a folder; what is read is kept.
+
+    Parameters
+    ----------
+    out
+        Folder of the runs.
+    """
 
     def __init__(self, out: Path) -> None:
         self.out = out
-        self.table: Callable[[str], pd.DataFrame] = lru_cache(maxsize=None)(
-            lambda sweep: load_table(out / sweep)
-        )
-        self.trajectory: Callable[[str], Group] = lru_cache(maxsize=32)(
-            lambda run: read_motion(run).groups[0]
-        )
+        self._read_table = lru_cache(maxsize=None)(load_table)
+        self._read_motion = lru_cache(maxsize=32)(read_motion)
+
+    def table(self, sweep: str) -> pd.DataFrame:
+        """The table of a sweep, by its name."""
+        return self._read_table(self.out / sweep)
+
+    def trajectory(self, run: str) -> Group:
+        """The first kind of walkers of a run, by its directory."""
+        return self._read_motion(run).groups[0]
 
     def finished(self, sweep: str) -> pd.DataFrame:
-        """The finished points of a sweep; raises `NothingFinishedError` if there is none."""
+        """The finished points of a sweep; raises `NothingFinishedError` if there are none."""
         table = self.table(sweep)
         done = table[table["status"] == "finished"]
         if done.empty:
@@ -97,28 +117,41 @@ class Sources:
 
     def runs(self, sweeps: Sequence[str]) -> list[str]:
         """Names of the finished runs of sweeps."""
-        return [Path(run).name for sweep in sweeps for run in self.finished(sweep)["run"]]
+        names = []
+        for sweep in sweeps:
+            names += [Path(run).name for run in self.finished(sweep)["run"]]
+        return names
 
 
 @cache
-def _by_theory(frequency: float) -> float:
-    """Γc of the walker of Fig. 2, driven at a frequency in Hz; a second each, for the figure and the comparison."""
+def _threshold_by_theory(frequency: float) -> float:
+    """Γc of the walker of Fig. 2 at a frequency in Hz; it takes a second and is needed twice."""
     return threshold(load_case("fig1b", {"drive.frequency": f"{frequency} Hz"}))
 
 
 def thresholds_with_theory(sources: Sources) -> pd.DataFrame:
-    """Γc of the sweep ``fig2-threshold``: the Γ0 at which walkers rest and move, and Γc of the ``theory``.
+    """Thresholds of motion Γc by engine and theory.
 
-    Also Γc of the sweep ``fig2-ramp``, ``ramp``, and its resolution, ``within``.
+    Parameters
+    ----------
+    sources
+        The sweeps ``fig2-threshold``, runs from rest, and ``fig2-ramp``, runs with a falling drive.
+
+    Returns
+    -------
+    DataFrame
+        A row for each frequency, ``drive.frequency`` in Hz. ``gamma0_at_rest`` and
+        ``gamma0_moving`` are the Γ0 at which walkers rest and move in runs from rest, ``theory`` is
+        Γc by the theory, ``ramp`` that with a falling drive, and ``within`` the resolution of
+        ``ramp``.
     """
     ends = thresholds(sources.table("fig2-threshold"))
-    shown = ends[["drive.frequency", "gamma0_at_rest", "gamma0_moving"]]
-    ramp = (
-        sources.table("fig2-ramp")
-        .groupby("drive.frequency")[["gamma0_stops_at", "gamma0_stops_within"]]
-        .first()
-    )
-    ramps = ramp.reindex(shown["drive.frequency"]).to_numpy(dtype=float).T
-    return shown.assign(
-        theory=[*map(_by_theory, ends["drive.frequency"])], ramp=ramps[0], within=ramps[1]
+    table = ends[["drive.frequency", "gamma0_at_rest", "gamma0_moving"]]
+    by_frequency = sources.table("fig2-ramp").groupby("drive.frequency")
+    stops = by_frequency[["gamma0_stops_at", "gamma0_stops_within"]].first()
+    stops = stops.reindex(table["drive.frequency"])
+    return table.assign(
+        theory=[_threshold_by_theory(frequency) for frequency in ends["drive.frequency"]],
+        ramp=stops["gamma0_stops_at"].to_numpy(dtype=float),
+        within=stops["gamma0_stops_within"].to_numpy(dtype=float),
     )
