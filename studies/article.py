@@ -1,4 +1,8 @@
-"""The article (article.md) as one HTML file with its pictures in it, and as PDF: ``python -m studies.article OUT``."""
+"""The article (article.md) as one HTML file with its pictures in it, and as PDF.
+
+``python -m studies.article OUT`` writes both. The numbers and pictures of article.md itself are
+made by `docs.illustrations`.
+"""
 
 from __future__ import annotations
 
@@ -20,8 +24,14 @@ from walkers.files import write_bytes
 from walkers.main import main, new_app
 
 TEXT = Path(__file__).with_name("article.md")
+"""The article."""
+
 DOCS = TEXT.parents[1] / "docs"
+"""The folder with the settings of sphinx."""
+
 TITLE = "Walkers and climbing piles of wet beads"
+"""Title of the HTML page."""
+
 _STYLE = """
 body { max-width: 46em; margin: 2em auto; padding: 0 1em; font: 11pt/1.45 serif; }
 img { max-width: 100%; }
@@ -35,9 +45,10 @@ a { color: inherit; text-decoration: none; }
 .headerlink { display: none; }
 @page { size: A4; margin: 18mm; }
 """
-_PAGE = '<!doctype html><html lang="en"><meta charset="utf-8"><title>{}</title><style>{}</style>{}</html>'
-
-
+_PAGE = (
+    '<!doctype html><html lang="en"><meta charset="utf-8">'
+    "<title>{title}</title><style>{style}</style>{body}</html>"
+)
 app = new_app("python -m studies.article")
 
 
@@ -64,7 +75,10 @@ def article(to: Annotated[Path, Parameter(name="OUT")], /) -> None:
 
 
 def _page() -> str:
-    """The article as HTML, by sphinx with the settings of docs/, of the text alone."""
+    """The article as one HTML page with its pictures in it.
+
+    Sphinx makes it with the settings of docs/; only the text of the article is taken.
+    """
     settings = {
         "root_doc": TEXT.stem,
         "include_patterns": TEXT.name,
@@ -77,18 +91,23 @@ def _page() -> str:
     with tempfile.TemporaryDirectory() as work:
         subprocess.run([*command, str(TEXT.parent), work], check=True)
         page = (Path(work) / "article.html").read_text("utf-8")
-        _, _, body = page.partition('<article class="bd-article">')
-        body, _, _ = body.partition("</article>")
-        body = re.sub(r'(?<=src=")[^"]+\.png', lambda match: _inline(Path(work) / match[0]), body)
-    return _PAGE.format(TITLE, _STYLE, body)
+        _, _, rest = page.partition('<article class="bd-article">')
+        article_text, _, _ = rest.partition("</article>")
+        body = re.sub(
+            r'(?<=src=")[^"]+\.png',
+            lambda source: _inline(Path(work) / source[0]),
+            article_text,
+        )
+    return _PAGE.format(title=TITLE, style=_STYLE, body=body)
 
 
 def _inline(picture: Path) -> str:
+    """A picture as a URL that contains it."""
     return "data:image/png;base64," + base64.b64encode(picture.read_bytes()).decode()
 
 
 def _printed(html: Path) -> bytes:
-    """A page as PDF."""
+    """The content of a PDF of a page, printed by Chromium."""
     with tempfile.TemporaryDirectory() as work:
         pdf = Path(work) / "article.pdf"
         command = [
@@ -97,8 +116,9 @@ def _printed(html: Path) -> bytes:
             "--no-sandbox",
             "--disable-gpu",
             "--no-pdf-header-footer",
+            f"--print-to-pdf={pdf}",
+            html.resolve().as_uri(),
         ]
-        command += [f"--print-to-pdf={pdf}", html.resolve().as_uri()]
         subprocess.run(command, check=True, capture_output=True)
         return pdf.read_bytes()
 
