@@ -76,8 +76,11 @@ def compare(sources: Sources) -> dict[str, Any]:
             Velocities by engine and theory beside the one-parameter curve of Figs. 2 and 3, mm/s.
             The curve is no measurement.
     """
-    cases = {name: _cases_of_facts(name) for name in parameter_sets()}
-    numbers = {name: _measured_numbers(sources, name) for name in parameter_sets()}
+    cases = {}
+    numbers = {}
+    for name in parameter_sets():
+        cases[name] = _cases_of_facts(name)
+        numbers[name] = _measured_numbers(sources, name)
     theory = _numbers_by_theory(cases["shipped"])
     facts = [_fact(observation, numbers, theory) for observation in ruby().file.observations]
     counted = [fact for fact in facts if not fact["derived"]]
@@ -145,8 +148,14 @@ def _fact(
 ) -> dict[str, Any]:
     """A fact, our number for each parameter set, and the theory's, in the unit of the fact."""
     scale = observation.unit[1]
-    values = {name: observation.number_from(of_set) for name, of_set in numbers.items()}
-    scaled = {name: value * scale for name, value in values.items()}
+    values = {}
+    texts = {}
+    agree = {}
+    for name, numbers_of_set in numbers.items():
+        value = observation.number_from(numbers_of_set)
+        values[name] = value * scale
+        texts[name] = _text_of(value, observation)
+        agree[name] = observation.agrees(value)
     by_theory = observation.number_from(theory) * scale
     return {
         "name": observation.name,
@@ -155,9 +164,9 @@ def _fact(
         "source": observation.source,
         "derived": observation.derived,
         "expected": observation.text,
-        "values": json_numbers(scaled),
-        "texts": {name: _text_of(value, observation) for name, value in values.items()},
-        "agree": {name: observation.agrees(value) for name, value in values.items()},
+        "values": json_numbers(values),
+        "texts": texts,
+        "agree": agree,
         "theory": by_theory if isfinite(by_theory) else None,
     }
 
