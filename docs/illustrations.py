@@ -1,10 +1,12 @@
-"""Pictures, tables, outputs of commands and numbers in the documentation that come from simulations.
+"""Pictures, tables, outputs and numbers in the documentation that come from simulations.
 
-All of them follow from the shipped parameters. `make_illustrations` makes them again and records a digest of the cases
-that each picture and table shows. `stale` lists those that show other cases than the current ones.
+All of them follow from the shipped parameters. `make_illustrations` makes them again and records a
+digest of the cases that each picture and table shows. `stale` lists those that show other cases
+than the current ones.
 
-Pages contain two kinds of invisible marks. A code block below ``<!--output-->`` begins with a command and contains its
-output. ``<!--fact fig4b_velocity-->8.15<!--/fact-->`` contains a number of the comparison.
+Pages contain two kinds of invisible marks. A code block below ``<!--output-->`` begins with a
+command and contains its output. ``<!--fact fig4b_velocity-->8.15<!--/fact-->`` contains a number of
+the comparison.
 """
 
 from __future__ import annotations
@@ -17,9 +19,10 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -34,12 +37,13 @@ from studies.paper.make import COMPARED, FIGURES, make_figures
 from studies.paper.sources import sweep_of
 from walkers import load_case, run, sweep
 from walkers.api import Changes, climb
+from walkers.arrays import FloatArray
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.calibration.report import write_outcome
 from walkers.errors import InputError, Problem
 from walkers.files import read_json, write_bytes, write_json
-from walkers.inputs.sweep import SweepDefinition, load_sweep
+from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.results import VERSION, modules_of
 from walkers.postprocess.show.drawing import (
@@ -56,227 +60,341 @@ from walkers.sweeps.scheduler import SweepOptions
 from walkers.templates.deck import CONTENT_VERSION
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
     from walkers.second_engine.scenes import Bench
 
 RECORD = Path("figures") / "made-from.json"
+"""Digests of the cases that each file shows, in docs/."""
+
 CHECKED = Path("figures") / "validation.json"
-"""Lines of ``python -m studies.literature``, of which pages quote numbers."""
+"""Lines of ``python -m studies.literature``, of which pages quote numbers, in docs/."""
+
 _BLOCK = re.compile(
     r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n).*?(?=^```)"
 )
+"""A code block with a command and its output."""
+
 _FACT = re.compile(r"<!--fact (?P<name>\S+)-->[^<]*<!--/fact-->")
+"""A number in a sentence."""
+
 _RUN_HASH = re.compile(r"-[0-9a-f]{12}\b")
-_PILES = ("pile-starts", "pile-frictions", "pile-contacts", "pile-paper")
-_OF_CLIMBS = (
-    *("pile", "climbed", "half by (s)", "climbs", "rate", "on plain walls", "in corners"),
-    *("led by large", "p by chance", "speed (mm/s)"),
-)
+"""The end of the name of a run."""
 
 
-Make: TypeAlias = Callable[[Path, Path], object]
-"""Makes the files of an illustration from the folders of runs and docs."""
-
-
-class Versions(NamedTuple):
+@dataclass(frozen=True)
+class Versions:
     """Versions of the decks and of the results with which an illustration was made."""
 
     decks: int = CONTENT_VERSION
     results: int = VERSION
 
 
-class Illustration(NamedTuple):
-    """Files of docs/, the cases that they show, and the function and the versions that make them."""
+_TODAY = Versions()
+
+
+@dataclass(frozen=True)
+class Illustration:
+    """Pictures and tables of the documentation that are made in one go.
+
+    Attributes
+    ----------
+    files
+        Their paths in docs/.
+    cases
+        Gives the cases that they show.
+    make
+        Makes the files from the folder of runs and the folder docs/. Missing runs are made.
+    versions
+        Versions of decks and results that the files have.
+    """
 
     files: tuple[str, ...]
-    cases: Callable[[], Iterable[Case]]
-    make: Make
-    versions: Versions
+    cases: Callable[[], list[Case]]
+    make: Callable[[Path, Path], None]
+    versions: Versions = _TODAY
 
 
-_TODAY = Versions()
-_OF_PILES = Versions(decks=9, results=1)
-"""Statistics of chaotic piles stand until what piles do changes: four core-hours, for other last digits of tables."""
+def _cases_of_sweeps(names: Iterable[str]) -> list[Case]:
+    """The cases of shipped sweeps."""
+    cases: list[Case] = []
+    for name in names:
+        cases += load_sweep(name).cases()
+    return cases
 
 
-ILLUSTRATIONS: dict[str, Illustration] = {}
+def _shipped_cases(*names: str) -> list[Case]:
+    return [load_case(name) for name in names]
 
 
-def _illustration(
-    name: str, *files: str, cases: Callable[[], Iterable[Case]], versions: Versions = _TODAY
-) -> Callable[[Make], Make]:
-    def enter(make: Make) -> Make:
-        ILLUSTRATIONS[name] = Illustration(files, cases, make, versions)
-        return make
+# --- pictures and films of a run ------------------------------------------------------------------
 
-    return enter
-
-
-def _cases(
-    *names: str, of: Callable[[str], SweepDefinition] = load_sweep
-) -> Callable[[], Iterable[Case]]:
-    """The cases of sweeps."""
-    return lambda: [case for name in names for case in of(name).cases()]
-
-
-def _shipped(*names: str, changes: Changes = None) -> Callable[[], Iterable[Case]]:
-    return lambda: [load_case(name, changes) for name in names]
+_SHORT_WALK = {"run.cycles": 60}
+"""Changes of ``fig1b`` for its picture and its film."""
 
 
 def _picture(
-    name: str, case: str, changes: Changes = None, film: Changes = None, walker: int | None = None
-) -> None:
-    """A picture of one run, or of one walker in it, as `walkers render` makes it, or a film."""
-    file = f"pictures/{name}"
+    file: str, name: str, changes: Changes = None, walker: int | None = None
+) -> Illustration:
+    """A picture of a run, or of one walker in it, as `walkers render` makes it."""
 
-    @_illustration(
-        Path(name).stem if not film else "film", file, cases=_shipped(case, changes=changes)
-    )
+    def cases() -> list[Case]:
+        return [load_case(name, changes)]
+
     def make(out: Path, docs: Path) -> None:
-        done = run(load_case(case, changes), out)
-        done.film(docs / file, **film) if film else done.render(docs / file, walker=walker)
+        run(load_case(name, changes), out).render(docs / file, walker=walker)
+
+    return Illustration((file,), cases, make)
 
 
-_picture("walker.png", "fig1b", {"run.cycles": 60})
-_FILM = {"size": (512, 216), "fps": 20, "slowdown": 20.0, "walker": 0, "end": 0.4}
-_picture("walker.gif", "fig1b", {"run.cycles": 60}, film=_FILM)
-_picture("tray.png", "tray")
-_picture("climber.png", "climber", walker=3)  # it starts 9.7° off the vertical, furthest of all six
-_picture("pile.png", "pile-small")
+def _film(file: str, name: str, changes: Changes) -> Illustration:
+    """A film of the first walker of a run."""
+
+    def cases() -> list[Case]:
+        return [load_case(name, changes)]
+
+    def make(out: Path, docs: Path) -> None:
+        walk = run(load_case(name, changes), out)
+        walk.film(docs / file, size=(512, 216), fps=20, slowdown=20.0, walker=0, end=0.4)
+
+    return Illustration((file,), cases, make)
 
 
-def _of_paper(name: str, *files: str, sweeps: Iterable[str]) -> None:
-    @_illustration(name, *files, cases=_cases(*sweeps, of=sweep_of))
+# --- figures of the paper -------------------------------------------------------------------------
+
+
+def _paper(name: str, files: tuple[str, ...], sweeps: Iterable[str]) -> Illustration:
+    """A figure of `studies.paper`, or its comparison, from these sweeps."""
+
+    def cases() -> list[Case]:
+        shown: list[Case] = []
+        for sweep_name in sweeps:
+            shown += sweep_of(sweep_name).cases()
+        return shown
+
     def make(out: Path, docs: Path) -> None:
         make_figures(out, docs / "figures", SweepOptions(), only=[name], formats=("png",))
 
+    return Illustration(files, cases, make)
 
-for _name, _figure in FIGURES.items():
-    _of_paper(_name, f"figures/{_name}.png", sweeps=_figure.sweeps)
-_of_paper("comparison", "figures/comparison.md", "figures/comparison.json", sweeps=COMPARED)
 
-_BY_FRICTION = {"x": "contact.friction.bead_wall", "y": "axial_velocity", "hue": "liquid.name"}
-_SWEEPS: Mapping[str, tuple[Mapping[str, str], Callable[[Any], list[dict[str, str]]] | None]] = {
-    "climb-liquids": (
-        {**_BY_FRICTION, "panels": "contact.roughness.bead_wall"},
-        tables.least_frictions,
+# --- figures and tables of sweeps -----------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _SweepFigure:
+    """How a sweep is shown.
+
+    Attributes
+    ----------
+    name
+        Name of the sweep.
+    y, x, hue, panels
+        What its figure shows, as for `walkers.Sweep.figure`.
+    rows
+        Gives the rows of its table in the documentation, if it has one.
+    marks_upright
+        Whether its figure shows how many clusters stay upright.
+    """
+
+    name: str
+    y: str
+    x: str | None = None
+    hue: str | None = None
+    panels: str | None = None
+    rows: Callable[[pd.DataFrame], list[dict[str, str]]] | None = None
+    marks_upright: bool = False
+
+
+_SWEEP_FIGURES = (
+    _SweepFigure(
+        "climb-liquids",
+        y="axial_velocity",
+        x="contact.friction.bead_wall",
+        hue="liquid.name",
+        panels="contact.roughness.bead_wall",
+        rows=tables.least_frictions,
     ),
-    "climb-corner": (_BY_FRICTION, tables.least_frictions),
-    "zoo": ({"y": "axial_velocity", "hue": "none"}, None),
-    "zoo-corner": ({"y": "axial_velocity"}, None),
-    "tray-phases": (
-        {
-            "x": "drive.peak_acceleration",
-            "y": "clustered_share",
-            "hue": "walkers",
-            "panels": "coverage",
-        },
-        tables.means_of_trays,
+    _SweepFigure(
+        "climb-corner",
+        y="axial_velocity",
+        x="contact.friction.bead_wall",
+        hue="liquid.name",
+        rows=tables.least_frictions,
     ),
-}
-"""Sweeps, how their figures show them, and the rows of their tables if they have one."""
+    _SweepFigure("zoo", y="axial_velocity", hue="none", marks_upright=True),
+    _SweepFigure("zoo-corner", y="axial_velocity", marks_upright=True),
+    _SweepFigure(
+        "tray-phases",
+        y="clustered_share",
+        x="drive.peak_acceleration",
+        hue="walkers",
+        panels="coverage",
+        rows=tables.means_of_trays,
+    ),
+)
+"""Sweeps whose figures and tables the documentation shows."""
 
 
-_ZOOS = ("zoo", "zoo-corner")
-"""Sweeps of clusters, whose figures show how many stay upright."""
+def _sweep(shown: _SweepFigure) -> Illustration:
+    """The figure of a sweep, and its table if it has one."""
+    figure_file = f"figures/{shown.name}.png"
+    table_file = f"figures/{shown.name}.md"
+
+    def cases() -> list[Case]:
+        return _cases_of_sweeps([shown.name])
+
+    def make(out: Path, docs: Path) -> None:
+        finished = sweep(shown.name, out)
+        figure = finished.figure(x=shown.x, y=shown.y, hue=shown.hue, panels=shown.panels)
+        if shown.marks_upright:
+            mark_upright(figure, finished.table())
+        runs = [point.directory.name for point in finished.runs]
+        save_figure(figure, docs / figure_file, runs)
+        if shown.rows:
+            rows = shown.rows(finished.table())
+            _write_page(docs / table_file, f"walkers list {shown.name}", rows)
+
+    files = (figure_file, table_file) if shown.rows else (figure_file,)
+    return Illustration(files, cases, make)
 
 
 @styled
 def mark_upright(figure: Figure, table: pd.DataFrame) -> None:
-    """Fill the symbols of clusters by how many of their walkers stay upright: all, some, or none."""
+    """Fill the symbols of clusters by how many of their walkers stay upright.
+
+    Parameters
+    ----------
+    figure
+        The figure of a sweep of clusters, with one line of points.
+    table
+        The table of the sweep, a row for each point.
+    """
     (axes,) = [panel for panel in figure.axes if panel.lines]
     (points,) = [line for line in axes.lines if line.get_marker() == "o"]
     shares = table["upright"].to_numpy(dtype=float) / table["walkers"].to_numpy(dtype=float)
     places, heights = map(np.asarray, points.get_data())
     points.set_marker("none")
-    kinds = {
-        "all upright": ("full", shares == 1.0),
-        "some upright": ("left", (shares > 0.0) & (shares < 1.0)),
-        "none upright": ("none", shares == 0.0),
-    }
-    for label, (fill, of_kind) in kinds.items():
-        look = {
-            "fillstyle": fill,
-            "markerfacecoloralt": "white",
-            "markersize": 6.0,
-            "clip_on": False,
-        }
-        axes.plot(places[of_kind], heights[of_kind], "ko", label=label, zorder=3, **look)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    groups = (
+        ("all upright", "full", shares == 1.0),
+        ("some upright", "left", (shares > 0.0) & (shares < 1.0)),
+        ("none upright", "none", shares == 0.0),
+    )
+    for label, fill, in_group in groups:
+        axes.plot(
+            places[in_group],
+            heights[in_group],
+            "ko",
+            label=label,
+            zorder=3,
+            fillstyle=fill,
+            markerfacecoloralt="white",
+            markersize=6.0,
+            clip_on=False,
+        )
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
 
 
-def _of_sweep(name: str) -> None:
-    options, rows = _SWEEPS[name]
-    files = [f"figures/{name}.png", *([f"figures/{name}.md"] if rows else [])]
-
-    @_illustration(name, *files, cases=_cases(name))
-    def make(out: Path, docs: Path) -> None:
-        done = sweep(name, out)
-        figure = done.figure(**options)
-        if name in _ZOOS:
-            mark_upright(figure, done.table())
-        save_figure(figure, docs / files[0], [point.directory.name for point in done.runs])
-        if rows:
-            write_bytes(
-                docs / files[1], tables.page(f"walkers list {name}", rows(done.table())).encode()
-            )
+def _write_page(file: Path, command: str, rows: Sequence[Mapping[str, str]]) -> None:
+    """Write a table below the command that prints its numbers."""
+    write_bytes(file, tables.page(command, rows).encode())
 
 
-for _name in _SWEEPS:
-    _of_sweep(_name)
+# --- climbs in piles ------------------------------------------------------------------------------
 
+_PILES = ("pile-starts", "pile-frictions", "pile-contacts", "pile-paper")
+"""Sweeps of piles whose climbs are counted."""
 
-@_illustration(
-    "pile-climbs",
-    "figures/pile-climbs.png",
-    "figures/pile-climbs.md",
-    cases=_cases(*_PILES),
-    versions=_OF_PILES,
+_COLUMNS_OF_CLIMBS = (
+    "pile",
+    "climbed",
+    "half by (s)",
+    "climbs",
+    "rate",
+    "on plain walls",
+    "in corners",
+    "led by large",
+    "p by chance",
+    "speed (mm/s)",
 )
-def _make_climbs(out: Path, docs: Path) -> None:
-    climbs = climb(
-        [sweep(name, out).directory for name in _PILES], to=docs / "figures" / "pile-climbs.png"
-    )
-    rows = [{name: texts[name] for name in _OF_CLIMBS} for texts in map(texts_of, climbs)]
-    write_bytes(
-        docs / "figures" / "pile-climbs.md",
-        tables.page(f"walkers climb {' '.join(_PILES)}", rows).encode(),
-    )
+"""Columns of the table of climbs, of those of `walkers climb`."""
+
+_VERSIONS_OF_PILES = Versions(decks=9, results=1)
+"""Versions of the piles, whose statistics stand until what piles do changes.
+
+Making them again takes four core-hours, for other last digits of tables.
+"""
 
 
-@_illustration("unexplained", "figures/unexplained.md", cases=_shipped("fig1b", "fig4a", "fig4b"))
-def _make_effects(_: Path, docs: Path) -> None:
-    write_bytes(
-        docs / "figures" / "unexplained.md", tables.page(effects.COMMAND, effects.rows()).encode()
-    )
+def _climbs() -> Illustration:
+    """The figure and the table of climbs."""
+    figure_file = "figures/pile-climbs.png"
+    table_file = "figures/pile-climbs.md"
+
+    def cases() -> list[Case]:
+        return _cases_of_sweeps(_PILES)
+
+    def make(out: Path, docs: Path) -> None:
+        directories = [sweep(name, out).directory for name in _PILES]
+        rows = []
+        for condition in climb(directories, to=docs / figure_file):
+            texts = texts_of(condition)
+            rows.append({column: texts[column] for column in _COLUMNS_OF_CLIMBS})
+        _write_page(docs / table_file, f"walkers climb {' '.join(_PILES)}", rows)
+
+    return Illustration((figure_file, table_file), cases, make, _VERSIONS_OF_PILES)
 
 
-_CHECKED_CASES = _shipped("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci")
+# --- effects beyond the law, and the literature ---------------------------------------------------
 
 
-@_illustration("validation", CHECKED.as_posix(), "figures/benchmarks.png", cases=_CHECKED_CASES)
-def _make_validation(out: Path, docs: Path) -> None:
-    lines = run_checks(LITERATURE, out)
-    write_json(docs / CHECKED, as_dict(lines))
-    save_figure(
-        _benchmarks(),
-        docs / "figures" / "benchmarks.png",
-        (),
-        title="Published benchmarks of impacts",
-    )
-    for line in failures(lines):
-        print(f"walkers: not as expected: {line.check}: {line.quantity}", file=sys.stderr)
+def _effects() -> Illustration:
+    """The table of `studies.effects`."""
+    file = "figures/unexplained.md"
+
+    def cases() -> list[Case]:
+        return _shipped_cases("fig1b", "fig4a", "fig4b")
+
+    def make(_out: Path, docs: Path) -> None:
+        _write_page(docs / file, effects.COMMAND, effects.rows())
+
+    return Illustration((file,), cases, make)
+
+
+def _validation() -> Illustration:
+    """All comparisons of `studies.literature`, and a figure of its benchmarks."""
+    figure_file = "figures/benchmarks.png"
+
+    def cases() -> list[Case]:
+        return _shipped_cases("fig1b", "fig4a", "fig4b", "climber", "climber-dimer", "pile-ci")
+
+    def make(out: Path, docs: Path) -> None:
+        lines = run_checks(LITERATURE, out)
+        write_json(docs / CHECKED, as_dict(lines))
+        title = "Published benchmarks of impacts"
+        save_figure(_benchmarks(), docs / figure_file, (), title=title)
+        for line in failures(lines):
+            print(f"walkers: not as expected: {line.check}: {line.quantity}", file=sys.stderr)
+
+    return Illustration((CHECKED.as_posix(), figure_file), cases, make)
 
 
 @styled
 def _benchmarks() -> Figure:
-    """Published points and the curves of the second engine, without those of the second material of test 4."""
+    """Published points and the curves of the second engine.
+
+    The second material of test 4 is left out.
+    """
     panels = {key: panel for key, panel in published().items() if not key.startswith("alloy-")}
     figure = new_figure(TWO_COLUMNS, 11.0)
     grid = figure.subplots(nrows=4, ncols=2)
     for axes, (key, panel) in zip(grid.flat, panels.items(), strict=True):
-        for series, marker in zip(panel["series"], "osD^"[: len(panel["series"])], strict=True):
-            axes.plot(*series["points"].T, marker, mfc="none", ms=4.0, label=series["name"])
-        axes.plot(*curve_of(key), color="k", lw=1.0, label="second engine")
+        for series, marker in zip(panel["series"], "osD^", strict=False):
+            x, y = series["points"].T
+            axes.plot(x, y, marker, mfc="none", ms=4.0, label=series["name"])
+        x, y = curve_of(key)
+        axes.plot(x, y, color="k", lw=1.0, label="second engine")
         axes.set(xlabel=panel["x"], ylabel=panel["y"], title=panel["title"])
         axes.set_xscale("log" if key == "spin" else "linear")
         legend_below(axes, ncols=2)
@@ -284,128 +402,215 @@ def _benchmarks() -> Figure:
     return figure
 
 
-@_illustration("others", "figures/others.png", cases=_shipped("symmetric"))
-def _make_others(_: Path, docs: Path) -> None:
-    with experiments.workbench() as bench:
-        save_figure(
-            _experiments(bench), docs / "figures" / "others.png", (), title="Experiments of others"
-        )
+def _others() -> Illustration:
+    """A figure of the experiments of others."""
+    file = "figures/others.png"
+
+    def cases() -> list[Case]:
+        return _shipped_cases("symmetric")
+
+    def make(_out: Path, docs: Path) -> None:
+        with experiments.workbench() as bench:
+            figure = _experiments(bench)
+        save_figure(figure, docs / file, (), title="Experiments of others")
+
+    return Illustration((file,), cases, make)
 
 
 @styled
 def _experiments(bench: Bench) -> Figure:
-    """Drift by two tones against phase and strength, and restitution on a wet plate against 1/St."""
+    """Drift by two tones against phase and strength, and restitution on a wet plate."""
     figure = new_figure(TWO_COLUMNS, 3.2)
-    phases, strengths, impacts = figure.subplots(ncols=3)
-    at, fine = experiments.PHASES, np.arange(0.0, 181.0, 10.0)
-    drifts = np.array([experiments.measured_drift(bench, phase) for phase in at])
-    curves = np.array([experiments.coulomb_drift(phase) for phase in fine])
-    for number, strength in enumerate(experiments.STRENGTHS):
-        phases.plot(at, drifts[:, number], "o", mfc="none", ms=4.0, color=f"C{number}")
-        phases.plot(
-            fine, curves[:, number], lw=1.0, color=f"C{number}", label=f"a = {strength:g} · 7/2 μg"
-        )
-    phases.plot(
-        fine,
-        [experiments.weak_friction_drift(phase) for phase in fine],
-        "k--",
-        lw=1.0,
-        label="weak friction",
-    )
-    for number, phase in enumerate((0.0, 90.0)):
-        of, curve = (
-            -rows[list(places).index(phase)] * experiments.STRENGTHS
-            for rows, places in ((drifts, at), (curves, fine))
-        )
-        strengths.plot(
-            experiments.STRENGTHS,
-            of,
-            "o",
-            mfc="none",
-            ms=4.0,
-            color=f"C{number}",
-            label=f"{phase:g}°",
-        )
-        strengths.plot(experiments.STRENGTHS, curve, lw=1.0, color=f"C{number}")
-    for label, how in (
-        ("70 GPa", {}),
-        ("70 GPa, bridge from the film on", {"law": f"{experiments.__file__}:law_with_film"}),
-        ("50 MPa", {"modulus": 5e7}),
-    ):
-        stokes, e = experiments.restitutions(bench, **how)
-        impacts.plot(1.0 / stokes[:, 2], e[:, 2], "o-", mfc="none", ms=4.0, lw=1.0, label=label)
-    inverse = np.array([0.0, 1.0 / stokes[:, 2].min()])
-    loss = np.log(experiments.FILM / experiments.ROUGHNESS) * inverse
-    impacts.plot(
-        inverse,
-        experiments.DRY_RESTITUTION * (1.0 - loss),
-        "k--",
-        lw=1.0,
-        label="lubrication, approach",
-    )
-    phases.set(xlabel="phase of the second tone (°)", ylabel="drift / speed of the first tone")
-    strengths.set(xlabel="a/(7/2 μg)", ylabel="drift / (7/2 μg/ω)")
-    impacts.set(xlabel="1/St", ylabel="restitution", ylim=(0.0, 1.0), xticks=(0.0, 0.005, 0.01))
-    for axes in (phases, strengths, impacts):
+    panels = figure.subplots(ncols=3)
+    drifts = np.array([experiments.measured_drift(bench, phase) for phase in experiments.PHASES])
+    _draw_phases(panels[0], drifts)
+    _draw_strengths(panels[1], drifts)
+    _draw_impacts(panels[2], bench)
+    for axes in panels:
         legend_below(axes)
-    letter_panels((phases, strengths, impacts))
+    letter_panels(panels)
     return figure
 
 
-_CALIBRATED = {
-    f"figures/{name.replace('predictions', 'calibration')}": name
-    for name in ("calibration.md", "calibration.json", "predictions.png")
+def _draw_phases(axes: Axes, drifts: FloatArray) -> None:
+    """Draw drifts against the phase of the second tone.
+
+    ``drifts`` are over the speed of the first tone, shape (phases, strengths).
+    """
+    phases = np.arange(0.0, 181.0, 10.0)
+    curves = np.array([experiments.coulomb_drift(phase) for phase in phases])
+    for number, strength in enumerate(experiments.STRENGTHS):
+        colour = f"C{number}"
+        label = f"a = {strength:g} · 7/2 μg"
+        axes.plot(experiments.PHASES, drifts[:, number], "o", mfc="none", ms=4.0, color=colour)
+        axes.plot(phases, curves[:, number], lw=1.0, color=colour, label=label)
+    limit = [experiments.weak_friction_drift(phase) for phase in phases]
+    axes.plot(phases, limit, "k--", lw=1.0, label="weak friction")
+    axes.set(xlabel="phase of the second tone (°)", ylabel="drift / speed of the first tone")
+
+
+def _draw_strengths(axes: Axes, drifts: FloatArray) -> None:
+    """Draw drifts at two phases against the strength of the tones; ``drifts`` as above."""
+    strengths = experiments.STRENGTHS
+    for number, phase in enumerate((0.0, 90.0)):
+        colour = f"C{number}"
+        measured = -drifts[list(experiments.PHASES).index(phase)] * strengths
+        curve = -experiments.coulomb_drift(phase) * strengths
+        label = f"{phase:g}°"
+        axes.plot(strengths, measured, "o", mfc="none", ms=4.0, color=colour, label=label)
+        axes.plot(strengths, curve, lw=1.0, color=colour)
+    axes.set(xlabel="a/(7/2 μg)", ylabel="drift / (7/2 μg/ω)")
+
+
+def _draw_impacts(axes: Axes, bench: Bench) -> None:
+    """Draw the restitution of impacts at 1 m/s on a wet plate against 1/St."""
+    law_with_film = f"{experiments.__file__}:law_with_film"
+    curves = {
+        "70 GPa": experiments.restitutions(bench),
+        "70 GPa, bridge from the film on": experiments.restitutions(bench, law=law_with_film),
+        "50 MPa": experiments.restitutions(bench, modulus=5e7),
+    }
+    for label, (stokes, restitution) in curves.items():
+        x = 1.0 / stokes[:, 2]
+        axes.plot(x, restitution[:, 2], "o-", mfc="none", ms=4.0, lw=1.0, label=label)
+    stokes, _ = curves["50 MPa"]
+    inverse = np.array([0.0, 1.0 / stokes[:, 2].min()])
+    loss = np.log(experiments.FILM / experiments.ROUGHNESS) * inverse
+    lubrication = experiments.DRY_RESTITUTION * (1.0 - loss)
+    axes.plot(inverse, lubrication, "k--", lw=1.0, label="lubrication, approach")
+    axes.set(xlabel="1/St", ylabel="restitution", ylim=(0.0, 1.0), xticks=(0.0, 0.005, 0.01))
+
+
+# --- calibration ----------------------------------------------------------------------------------
+
+
+def _calibration() -> Illustration:
+    """The outcome of the calibration ``ruby``."""
+    outcome_of = {
+        "figures/calibration.md": "calibration.md",
+        "figures/calibration.json": "calibration.json",
+        "figures/calibration.png": "predictions.png",
+    }
+
+    def cases() -> list[Case]:
+        return list(load_calibration("ruby").sweep("ruby").cases())
+
+    def make(out: Path, docs: Path) -> None:
+        outcome = calibrate(load_calibration("ruby"), out, SweepOptions())
+        write_outcome(outcome, out / "ruby")
+        for file, written in outcome_of.items():
+            shutil.copy(out / "ruby" / written, docs / file)
+
+    return Illustration(tuple(outcome_of), cases, make)
+
+
+# --- all illustrations ----------------------------------------------------------------------------
+
+ILLUSTRATIONS: dict[str, Illustration] = {
+    "walker": _picture("pictures/walker.png", "fig1b", _SHORT_WALK),
+    "film": _film("pictures/walker.gif", "fig1b", _SHORT_WALK),
+    "tray": _picture("pictures/tray.png", "tray"),
+    # Walker 3 starts 9.7° off the vertical, furthest of all six.
+    "climber": _picture("pictures/climber.png", "climber", walker=3),
+    "pile": _picture("pictures/pile.png", "pile-small"),
 }
+"""All illustrations by name."""
 
-
-@_illustration(
-    "calibration", *_CALIBRATED, cases=lambda: load_calibration("ruby").sweep("ruby").cases()
+for _name, _drawing in FIGURES.items():
+    ILLUSTRATIONS[_name] = _paper(_name, (f"figures/{_name}.png",), _drawing.sweeps)
+ILLUSTRATIONS["comparison"] = _paper(
+    "comparison", ("figures/comparison.md", "figures/comparison.json"), COMPARED
 )
-def _make_calibration(out: Path, docs: Path) -> None:
-    write_outcome(calibrate(load_calibration("ruby"), out, SweepOptions()), out / "ruby")
-    for file, name in _CALIBRATED.items():
-        shutil.copy(out / "ruby" / name, docs / file)
+for _shown in _SWEEP_FIGURES:
+    ILLUSTRATIONS[_shown.name] = _sweep(_shown)
+ILLUSTRATIONS["pile-climbs"] = _climbs()
+ILLUSTRATIONS["unexplained"] = _effects()
+ILLUSTRATIONS["validation"] = _validation()
+ILLUSTRATIONS["others"] = _others()
+ILLUSTRATIONS["calibration"] = _calibration()
+
+
+# --- what is out of date --------------------------------------------------------------------------
+
+
+def digest(illustration: Illustration) -> str:
+    """Twelve hex digits over the cases of an illustration and its versions.
+
+    The binary of the engine does not count.
+    """
+    cases = illustration.cases()
+    determinants: dict[str, Any] = {"cases": [case.determinants() for case in cases]}
+    determinants.update(asdict(illustration.versions))
+    if illustration.versions == _TODAY:
+        changed = _changed_modules(cases)
+        if changed:
+            determinants["modules"] = changed
+    return hashlib.sha256(json.dumps(determinants, sort_keys=True).encode()).hexdigest()[:12]
 
 
 def _changed_modules(cases: Iterable[Case]) -> dict[str, int]:
     """Versions of the modules that measure the cases, where they differ from that of results."""
-    modules = [module for case in cases for module in modules_of(case)]
-    return {module.NAME: module.VERSION for module in modules if module.VERSION != VERSION}
-
-
-def digest(illustration: Illustration) -> str:
-    """Twelve hex digits over the cases of an illustration and its versions; the engine binary does not count."""
-    cases = list(illustration.cases())
-    determinants = [case.determinants() for case in cases]
-    contents = {"cases": determinants, **illustration.versions._asdict()}
-    if illustration.versions == _TODAY and (changed := _changed_modules(cases)):
-        contents["modules"] = changed
-    return hashlib.sha256(json.dumps(contents, sort_keys=True).encode()).hexdigest()[:12]
+    versions = {}
+    for case in cases:
+        for module in modules_of(case):
+            if module.VERSION != VERSION:
+                versions[module.NAME] = module.VERSION
+    return versions
 
 
 def stale(docs: Path) -> dict[str, list[str]]:
-    """The illustrations with files that are missing or show other cases than the current ones, and these files."""
-    record, old = read_json(docs / RECORD), {}
+    """Find what is out of date.
+
+    Parameters
+    ----------
+    docs
+        The folder docs/.
+
+    Returns
+    -------
+    dict
+        By illustration, its files that are missing or show other cases than the current ones.
+        Illustrations without such files are left out.
+    """
+    record = read_json(docs / RECORD)
+    stale_files = {}
     for name, illustration in ILLUSTRATIONS.items():
         today = digest(illustration)
-        old[name] = [
-            file
-            for file in illustration.files
-            if record.get(file) != today or not (docs / file).is_file()
-        ]
-    return {name: files for name, files in old.items() if files}
+        files = []
+        for file in illustration.files:
+            if record.get(file) != today or not (docs / file).is_file():
+                files.append(file)
+        if files:
+            stale_files[name] = files
+    return stale_files
 
 
 def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[Path]:
-    """Make the named pictures and tables, or all that are stale, then update the pages.
+    """Make pictures and tables, then update the pages.
 
-    ``out`` is the folder of the run directories. Missing runs are made.
+    Parameters
+    ----------
+    out
+        Folder of the runs; missing runs are made.
+    docs
+        The folder docs/.
+    only
+        Names of `ILLUSTRATIONS`; if empty, all that are stale.
+
+    Returns
+    -------
+    list of Path
+        The written files and the pages that have changed.
+
+    Raises
+    ------
+    InputError
+        If an illustration does not exist.
     """
     for name in only:
         if name not in ILLUSTRATIONS:
-            raise InputError(
-                "illustrations", [Problem("", name, f"expected one of {', '.join(ILLUSTRATIONS)}")]
-            )
+            problem = Problem("", name, f"expected one of {', '.join(ILLUSTRATIONS)}")
+            raise InputError("illustrations", [problem])
     written = []
     for name in only or stale(docs):
         print(f"walkers: {name}", file=sys.stderr)
@@ -416,85 +621,138 @@ def make_illustrations(out: Path, docs: Path, only: Sequence[str] = ()) -> list[
         written += [docs / file for file in illustration.files]
     numbers = facts(docs)
     for page in pages_of(docs):
-        old = page.read_text("utf-8")
-        new = refreshed(old, numbers, lambda command: output_of(command, out))
-        if without_hashes(new) != without_hashes(old):
-            write_bytes(page, new.encode())
+        text = page.read_text("utf-8")
+        today = refreshed(text, numbers, lambda command: output_of(command, out))
+        if without_hashes(today) != without_hashes(text):
+            write_bytes(page, today.encode())
             written.append(page)
     return written
 
 
 def pages_of(docs: Path) -> list[Path]:
     """README, the article and all pages of the documentation."""
-    return [
-        docs.parent / "README.md",
-        docs.parent / "studies" / "article.md",
-        *sorted(docs.rglob("*.md")),
-    ]
+    root = docs.parent
+    return [root / "README.md", root / "studies" / "article.md", *sorted(docs.rglob("*.md"))]
+
+
+# --- numbers and outputs on pages -----------------------------------------------------------------
 
 
 def facts(docs: Path) -> dict[str, str]:
-    """Numbers that sentences may quote: of comparison and calibration, of `CHECKED`, of the tables of climbs."""
-    compared: dict[str, Any] = read_json(docs / "figures" / "comparison.json")
-    shipped, counted = next(iter(compared["sets"].items()))
-    values = {fact["name"]: fact["values"][shipped] for fact in compared["facts"]}
-    numbers = {name: f"{value:.3g}" for name, value in values.items() if value is not None}
-    numbers["agree"] = f"{counted['agree']} of {counted['of']}"
-    numbers["threshold"] = (
-        f"{np.mean([list(row.values())[1:3] for row in compared['thresholds']]):.2f}"
-    )
-    by_frequency = {row["of"]: row["by_frequency"] for row in compared["curve"]}
-    numbers["by_frequency_5g"] = f"{by_frequency['Fig. 2, 5 g']:.2f}"
-    checked = read_json(docs / CHECKED)["lines"]
+    """Numbers that sentences may quote.
+
+    Parameters
+    ----------
+    docs
+        The folder docs/ with its figures.
+
+    Returns
+    -------
+    dict
+        Texts by name: of the comparison with the paper, of the calibration, of `CHECKED`, and of
+        the cells of tables.
+    """
+    numbers = _of_comparison(read_json(docs / "figures" / "comparison.json"))
     numbers |= tables.calibration_numbers(read_json(docs / "figures" / "calibration.json"))
-    return {**numbers, **_of_checks(checked), **dict(tables.cell_texts(docs / "figures"))}
+    numbers |= _of_checks(read_json(docs / CHECKED)["lines"])
+    numbers |= dict(tables.cell_texts(docs / "figures"))
+    return numbers
+
+
+def _of_comparison(compared: Mapping[str, Any]) -> dict[str, str]:
+    """Numbers of ``comparison.json`` with the shipped parameters."""
+    shipped, counted = next(iter(compared["sets"].items()))
+    numbers = {}
+    for fact in compared["facts"]:
+        value = fact["values"][shipped]
+        if value is not None:
+            numbers[fact["name"]] = f"{value:.3g}"
+    numbers["agree"] = f"{counted['agree']} of {counted['of']}"
+    ends = []
+    for row in compared["thresholds"]:
+        ends.append([row["gamma0_at_rest"], row["gamma0_moving"]])
+    numbers["threshold"] = f"{np.mean(ends):.2f}"
+    for row in compared["curve"]:
+        if row["of"] == "Fig. 2, 5 g":
+            numbers["by_frequency_5g"] = f"{row['by_frequency']:.2f}"
+    return numbers
 
 
 def _of_checks(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:
-    """The measured and the expected number of each line by check and words, and some numbers of many lines."""
+    """The measured and the expected number of each line by check and words, and summaries."""
     numbers: dict[str, str] = {}
     for line in lines:
-        name = "_".join(re.findall(r"\w+", f"{line['check']} {line['quantity']}".lower()))
-        numbers |= {name: f"{line['measured']:.4g}", f"{name}_expected": f"{line['expected']:.4g}"}
+        words = re.findall(r"\w+", f"{line['check']} {line['quantity']}".lower())
+        name = "_".join(words)
+        numbers[name] = f"{line['measured']:.4g}"
+        numbers[f"{name}_expected"] = f"{line['expected']:.4g}"
     for check in LITERATURE:
-        judged = [
-            line for line in lines if line["check"] == check and line["tolerance"] is not None
-        ]
+        judged = []
+        for line in lines:
+            if line["check"] == check and line["tolerance"] is not None:
+                judged.append(line)
         passed = sum(line["verdict"] == "pass" for line in judged)
         numbers[f"{check}_pass"] = f"{passed} of {len(judged)}"
-        for test in sorted(
-            {line["quantity"][0] for line in judged} if check == "benchmarks" else ()
-        ):
-            shares = [
-                line["error"] / line["tolerance"]
-                for line in judged
-                if line["quantity"].startswith(test)
-            ]
-            numbers[f"benchmarks_{test}"] = f"{100.0 * max(shares):.0f}"
-    crossed = [line for line in lines if line["check"] == "crosscheck"]
-    walked = [line["error"] for line in crossed if line["quantity"].endswith(": velocity")]
-    apart = [
-        line["measured"]
-        for line in crossed
-        if line["quantity"].endswith(": largest distance of a bead")
-    ]
-    cycles = [
-        line["measured"] for line in crossed if re.search("start .*: cycles", line["quantity"])
-    ]
+        if check == "benchmarks":
+            numbers |= _of_benchmarks(judged)
+    return numbers | _of_crosscheck([line for line in lines if line["check"] == "crosscheck"])
+
+
+def _of_benchmarks(judged: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """The largest error of each benchmark test, per cent of its tolerance."""
+    largest: dict[str, float] = {}
+    for line in judged:
+        test = line["quantity"][0]
+        share = line["error"] / line["tolerance"]
+        largest[test] = max(share, largest.get(test, 0.0))
+    return {f"benchmarks_{test}": f"{100.0 * share:.0f}" for test, share in largest.items()}
+
+
+def _of_crosscheck(lines: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """Largest errors of whole runs, and the cycles after which piles move differently."""
+    velocities = []
+    distances = []
+    cycles = []
+    for line in lines:
+        if line["quantity"].endswith(": velocity"):
+            velocities.append(line["error"])
+        if line["quantity"].endswith(": largest distance of a bead"):
+            distances.append(line["measured"])
+        if re.search("start .*: cycles", line["quantity"]):
+            cycles.append(line["measured"])
+    regular = distances[: -len(cycles)]  # piles, which are chaotic, come last
     return {
-        **numbers,
-        "crosscheck_velocity": f"{max(walked):.1g}",
-        "crosscheck_distance": f"{max(apart[: -len(cycles)]):.1g}",
+        "crosscheck_velocity": f"{max(velocities):.1g}",
+        "crosscheck_distance": f"{max(regular):.1g}",
         "crosscheck_cycles": f"{min(cycles):.0f} to {max(cycles):.0f}",
     }
 
 
 def refreshed(page: str, numbers: Mapping[str, str], printed: Callable[[str], str]) -> str:
-    """The text of a page with the current numbers, and with what its commands print."""
-    page = _FACT.sub(
-        lambda fact: f"<!--fact {fact['name']}-->{numbers[fact['name']]}<!--/fact-->", page
-    )
-    return _BLOCK.sub(lambda block: block["head"] + printed(block["command"]), page)
+    """Put the current numbers and outputs into a page.
+
+    Parameters
+    ----------
+    page
+        The text of the page.
+    numbers
+        Numbers of sentences by name, as from `facts`.
+    printed
+        Gives what a command prints.
+
+    Returns
+    -------
+    str
+        The new text of the page.
+    """
+
+    def fact(mark: re.Match[str]) -> str:
+        return f"<!--fact {mark['name']}-->{numbers[mark['name']]}<!--/fact-->"
+
+    def block(mark: re.Match[str]) -> str:
+        return mark["head"] + printed(mark["command"])
+
+    return _BLOCK.sub(block, _FACT.sub(fact, page))
 
 
 without_hashes = partial(_RUN_HASH.sub, "")
@@ -502,14 +760,23 @@ without_hashes = partial(_RUN_HASH.sub, "")
 
 
 def output_of(command: str, out: Path) -> str:
-    """What a command on a case prints; runs are in ``runs``, wherever that is."""
+    """Run a command on a case and return what it prints.
+
+    Parameters
+    ----------
+    command
+        The command as on a page, which has its runs in the folder ``runs``.
+    out
+        The folder of runs that is used instead.
+    """
     _, name, *arguments = shlex.split(command)
     if "--theory" in arguments:
-        run(
-            next(word for word in arguments if not word.startswith("-")), out
-        )  # which it prints beside the models
+        # The command prints the result of the run beside the models, if there is one.
+        case = next(word for word in arguments if not word.startswith("-"))
+        run(case, out)
     words = [sys.executable, "-m", "walkers.main", name, *arguments, "--out", str(out)]
-    words += ["--force"] if name == "run" else []  # else it says that it was run already
+    if name == "run":
+        words.append("--force")  # otherwise the output says that it was run already
     printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout
     return printed.replace(str(out), "runs")
 
