@@ -1,4 +1,7 @@
-"""Configuration of the site that ``make docs`` builds from docs/, the docstrings and the program's declarations."""
+"""Configuration of the site that ``make docs`` builds.
+
+Its pages come from docs/, from the docstrings, and from the declarations of the program.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,8 @@ sys.path[:0] = [str(HERE.parent), str(HERE / "_ext")]
 
 from walkers.runner.failures import UnauditedEngineWarning  # noqa: E402
 
-warnings.simplefilter(
-    "ignore", UnauditedEngineWarning
-)  # an example's engine may never have been audited
+# The engine that runs the examples may never have been audited.
+warnings.simplefilter("ignore", UnauditedEngineWarning)
 
 project = "granular-walkers"
 author = "the authors of granular-walkers"
@@ -22,15 +24,23 @@ project_copyright = author
 version = release = metadata.version("granular-walkers")
 
 extensions = [
-    *("numpydoc", "sphinx.ext.autodoc", "myst_parser"),
-    *("sphinx_copybutton", "sphinx_design", "sphinx_gallery.gen_gallery", "sphinxcontrib.bibtex"),
-    *("mathml", "generated", "texts"),  # docs/_ext
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "myst_parser",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
+    "sphinxcontrib.bibtex",
+    # The rest is in docs/_ext.
+    "mathml",
+    "generated",
+    "texts",
 ]
 exclude_patterns = ["_ext", "examples", "gallery/**.ipynb", "joss"]
 default_role = "py:obj"
 nitpicky = False
 
-# Pages are Markdown that GitHub shows as well: links between them by their files, formulas in dollars.
+# GitHub shows the pages too: they are Markdown, links name files, and formulas stand in dollars.
 myst_enable_extensions = ["dollarmath", "colon_fence", "attrs_block", "deflist"]
 myst_heading_anchors = 4
 myst_links_external_new_tab = False
@@ -44,9 +54,8 @@ html_static_path = ["_static"]
 html_css_files = ["walkers.css"]
 html_show_sourcelink = False
 html_copy_source = False
-html_show_search_summary = (
-    False  # a browser may not read other pages from disk: docs/_ext/texts.py instead
-)
+# A browser may not read other pages from disk; docs/_ext/texts.py gives the search their texts.
+html_show_search_summary = False
 html_search_scorer = str(HERE / "_static" / "scorer.js")
 html_theme_options = {
     "navbar_align": "left",

@@ -1,4 +1,7 @@
-"""Pictures in the gallery whose files a block of an example leaves as its last value, as a notebook shows them."""
+"""A scraper of sphinx-gallery for pictures that an example leaves as the last value of a block.
+
+A notebook shows them in the same way. Figures of matplotlib have a scraper of their own.
+"""
 
 from __future__ import annotations
 
@@ -10,16 +13,35 @@ from sphinx_gallery.scrapers import figure_rst
 
 from walkers.api import Pictures
 
+_LAST_VALUE = "___"
+"""The name under which sphinx-gallery keeps the last value of a block."""
+
 
 def scraper(_block: Any, variables: dict[str, Any], configuration: dict[str, Any]) -> str:
-    """Copy the pictures of `walkers`, or an image of IPython, beside the pages; show them once."""
-    last = variables["example_globals"].get("___")  # of sphinx-gallery
+    """Show the last value of a block if it is pictures of `walkers` or an image of IPython.
+
+    Parameters
+    ----------
+    variables
+        What sphinx-gallery knows about the example.
+    configuration
+        The settings of sphinx-gallery.
+
+    Returns
+    -------
+    str
+        The pictures as reStructuredText; their files are copied beside the pages.
+    """
+    values = variables["example_globals"]
+    last = values.get(_LAST_VALUE)
     files = last if isinstance(last, Pictures) else [getattr(last, "filename", None)]
-    places = []
-    for file in filter(None, files):
+    copies = []
+    for file in files:
+        if file is None:
+            continue
         place = Path(next(variables["image_path_iterator"])).with_suffix(Path(file).suffix)
-        places.append(str(shutil.copy(file, place)))
-        variables["example_globals"]["___"] = None  # not as text too
-    return str(
-        figure_rst(places, configuration["src_dir"], srcsetpaths=[{0: place} for place in places])
-    )
+        copies.append(str(shutil.copy(file, place)))
+    if copies:
+        values[_LAST_VALUE] = None  # otherwise the value is printed too
+    sizes = [{0: copy} for copy in copies]
+    return str(figure_rst(copies, configuration["src_dir"], srcsetpaths=sizes))

@@ -1,4 +1,8 @@
-"""The texts of all pages in a script of the search page, because a browser may not read other pages from disk."""
+"""The texts of all pages in a script of the search page.
+
+The search shows them below its results. A browser may not read other pages from disk, which is how
+Sphinx gets them.
+"""
 
 from __future__ import annotations
 
@@ -16,24 +20,25 @@ _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 def _load(
     app: Sphinx, page: str, _template: str, _context: dict[str, Any], _doctree: object
 ) -> None:
+    """Let the search page load the script."""
     if page == "search":
         app.add_js_file(_FILE)
 
 
 def _write(app: Sphinx, error: Exception | None) -> None:
-    if error is None and app.builder.format == "html":
-        texts = (
-            (name, _COMMENT.sub("", app.env.get_doctree(name).astext()))
-            for name in app.env.found_docs
-        )
-        pages = {name: " ".join(text.split()) for name, text in texts}
-        (Path(app.outdir) / "_static" / _FILE).write_text(
-            f"const TEXTS = {json.dumps(pages)};\n", "utf-8"
-        )
+    """Write the script once a site is built."""
+    if error is not None or app.builder.format != "html":
+        return
+    texts = {}
+    for page in app.env.found_docs:
+        text = _COMMENT.sub("", app.env.get_doctree(page).astext())
+        texts[page] = " ".join(text.split())
+    script = Path(app.outdir) / "_static" / _FILE
+    script.write_text(f"const TEXTS = {json.dumps(texts)};\n", "utf-8")
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    """Called by Sphinx."""
+    """Connect the extension to Sphinx."""
     app.connect("html-page-context", _load)
     app.connect("build-finished", _write)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
