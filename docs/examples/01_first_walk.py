@@ -11,7 +11,7 @@ run = walkers.run("fig1b")
 print(run.describe())
 
 # %%
-# A picture of one walker at three times. The grid is fixed to the floor.
+# A picture of one walker at three times. The grid is fixed to the substrate.
 
 run.render("runs/first_walk.png", images=3)
 

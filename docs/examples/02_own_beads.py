@@ -2,8 +2,8 @@
 Your own beads and liquid
 =========================
 
-Write a case for steel beads in a water-glycerol mixture on glass. The case gives every number that the library does
-not have.
+Write a case for steel beads in a water-glycerol mixture on glass. The case gives every number that
+the library does not have.
 """
 
 from pathlib import Path
@@ -43,8 +43,8 @@ run = walkers.run(file)
 print(run.describe())
 
 # %%
-# The result lists the values that have not been measured: here friction, roughness and the liquid. See
-# :doc:`/how-to/own-beads` for the uncertainty that these values cause.
+# The result lists the values that have not been measured: here friction, roughness and the liquid.
+# See :doc:`/how-to/own-beads` for the uncertainty that these values cause.
 
 run.render("runs/steel.png", images=3)
 

@@ -2,8 +2,8 @@
 A sweep: velocity against the drive
 ===================================
 
-Vary the peak acceleration from 1 to 9 g. The lines are predictions of the theory; nothing in them is fitted to the
-runs.
+Vary the peak acceleration from 1 to 9 g. The lines are predictions of the theory; nothing in them
+is fitted to the runs.
 """
 
 from pathlib import Path

@@ -2,7 +2,8 @@
 The threshold of motion
 =======================
 
-Lower the drive in steps until the walkers stop, at two frequencies; or in one run, as in the paper.
+Lower the drive until the walkers stop: in steps, at two frequencies, or in a single run, as
+in the paper.
 """
 
 from pathlib import Path
@@ -35,21 +36,22 @@ table = walkers.sweep("runs/threshold.toml").table()
 
 figure, axes = plt.subplots(figsize=(7, 4))
 for frequency, steps in table.groupby("drive.frequency"):
-    axes.plot(
-        steps["drive.peak_acceleration"], 1e3 * steps["velocity"], "o-", label=f"{frequency:g} Hz"
-    )
+    peak_acceleration = steps["drive.peak_acceleration"]
+    axes.plot(peak_acceleration, 1e3 * steps["velocity"], "o-", label=f"{frequency:g} Hz")
 axes.set(xlabel="peak acceleration (g)", ylabel="velocity (mm/s)")
 axes.legend()
 plt.show()
 
 # %%
-# In one run the drive falls by a ramp. The result has the drive at which the walkers stop; it is as exact as the drive
-# changes in eight cycles.
+# In a single run, the drive falls by a ramp. The result has the peak acceleration at which the
+# walkers stop, and its uncertainty, the fall of the drive in eight cycles; both are in m/s².
 
-falling = {
+falling_drive = {
     "drive.peak_acceleration": "1.2 g",
     "drive.ramp": [["0 s", 1], ["1 s", 0.5]],
     "dimers.replicates": 2,
 }
-result = walkers.run(walkers.load_case("fig1b", falling)).result
-print(f"they stop at {result['stops_at'] / 9.8:.2f} g, within {result['stops_within'] / 9.8:.2f} g")
+run = walkers.run(walkers.load_case("fig1b", falling_drive))
+stops_at = run.result["stops_at"] / 9.8
+stops_within = run.result["stops_within"] / 9.8
+print(f"they stop at {stops_at:.2f} g, within {stops_within:.2f} g")

@@ -2,8 +2,8 @@
 A map of modes
 ==============
 
-Vary two quantities at once: the asymmetry of the beads and the dimensionless peak force. Walkers rest at a weak drive
-and walk faster with more asymmetry.
+Vary two quantities: the asymmetry of the beads and the dimensionless peak force. Walkers rest at a
+weak drive and walk faster with more asymmetry.
 """
 
 from pathlib import Path
@@ -27,7 +27,7 @@ drive.gamma0     = { linspace = [0.1, 1.3, 7] }
 table = walkers.sweep("runs/map.toml").table()
 
 # %%
-# ``pivot`` makes an array of two axes.
+# ``pivot`` of pandas makes a table with a row per asymmetry and a column per force.
 
 velocity = table.pivot(index="dimers.sin_delta", columns="drive.gamma0", values="velocity")
 figure, axes = plt.subplots(figsize=(7, 4))

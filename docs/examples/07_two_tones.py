@@ -2,8 +2,8 @@
 Two tones move a symmetric dimer
 ================================
 
-A dimer of two equal beads does not walk under one tone. A second tone at twice the frequency breaks the symmetry of
-the drive. The direction depends on the phase between the tones.
+A dimer of two equal beads does not walk under one tone. A second tone at twice the frequency breaks
+the symmetry of the drive. The direction depends on the phase between the tones.
 """
 
 from pathlib import Path
@@ -47,8 +47,12 @@ case = "two_tones_case.toml"
 """)
 table = walkers.sweep("runs/two_tones.toml").table()
 
+# %%
+# The velocity is positive in the direction that the walkers face.
+
+phase = table["drive.harmonics[1].phase"]
 figure, axes = plt.subplots(figsize=(7, 4))
-axes.plot(table["drive.harmonics[1].phase"], 1e3 * table["velocity"], "o-")
+axes.plot(phase, 1e3 * table["velocity"], "o-")
 axes.axhline(0.0, color="0.5", lw=0.8)
 axes.set(xlabel="phase of the second tone (°)", ylabel="velocity (mm/s)", xticks=range(0, 361, 90))
 plt.show()

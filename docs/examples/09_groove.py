@@ -2,7 +2,8 @@
 A walker in a groove
 ====================
 
-Put the walker of Fig. 1b into a V-shaped groove and vary the opening angle. Each bead then touches two walls.
+Put the walker of Fig. 1b into a V-shaped groove and vary the opening angle. Each bead then touches
+two walls.
 """
 
 from pathlib import Path
@@ -31,6 +32,6 @@ axes.set(xlabel="opening of the groove (°)", ylabel="velocity (mm/s)")
 plt.show()
 
 # %%
-# The picture shows the narrowest groove.
+# The picture shows the narrowest groove, the first point of the sweep.
 
 sweep.runs[0].render("runs/groove.png", images=3)

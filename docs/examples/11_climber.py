@@ -2,8 +2,9 @@
 A cluster climbs a wall
 =======================
 
-A large bead above two small ones side by side, with one more below, stands on a vertical wall that is shaken
-vertically. Six such clusters start up to 10° off the vertical. All of them turn upright and climb.
+A cluster has a large bead above two small ones side by side, and one more small bead below. It is
+on a vertical wall that is shaken vertically. Six such clusters start up to 10° off the vertical.
+All of them turn upright and climb.
 """
 
 import matplotlib.pyplot as plt
@@ -20,13 +21,18 @@ print(run.describe())
 samples = run.case.run.samples_per_cycle
 figure, (angles, heights) = plt.subplots(1, 2, figsize=(9, 4))
 for _, climber in run.trajectory.groupby("walker"):
-    strobed = climber.iloc[::samples]
-    angles.semilogy(strobed["time"], np.degrees(np.abs(strobed["orientation"])))
-    heights.plot(strobed["time"], 1e3 * (strobed["x"] - strobed["x"].iloc[0]))
+    once_per_cycle = climber.iloc[::samples]
+    time = once_per_cycle["time"]
+    angle = np.degrees(once_per_cycle["orientation"].abs())
+    height = once_per_cycle["x"] - once_per_cycle["x"].iloc[0]
+    angles.semilogy(time, angle)
+    heights.plot(time, 1e3 * height)
 angles.set(xlabel="time (s)", ylabel="angle from the vertical (°)", ylim=(1e-4, 20.0))
 heights.set(xlabel="time (s)", ylabel="height climbed (mm)")
 figure.tight_layout()
 plt.show()
 
 # %%
+# The pictures show the first cluster at six times.
+
 run.render("runs/climber.png")

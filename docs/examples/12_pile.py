@@ -2,8 +2,8 @@
 A pile in a box
 ===============
 
-Pour 60 wet beads of two sizes into a box 4 mm wide and shake it vertically. This run is too short for clusters to
-climb; ``pile-small`` is shaken until one has.
+Pour 60 wet beads of two sizes into a box 4 mm wide and shake it vertically. This run is too short
+for clusters to climb; ``pile-small`` is shaken until one has climbed.
 """
 
 import matplotlib.pyplot as plt
@@ -14,6 +14,8 @@ run = walkers.run("pile-ci")
 print(run.describe())
 
 # %%
+# Views from the side, at equal time intervals:
+
 run.render("runs/pile.png")
 
 # %%

@@ -2,8 +2,8 @@
 A film
 ======
 
-Film a walker for four cycles of the drive, 50 times slower than in reality. The film shows how the beads roll and how
-the floor shakes.
+Film a walker for four cycles of the drive, 50 times slower than in reality. The film shows how the
+beads roll and how the substrate shakes.
 """
 
 from IPython.display import Image
@@ -12,7 +12,13 @@ import walkers
 
 run = walkers.run("fig4b")
 film = run.film(
-    "runs/walk.gif", size=(480, 240), fps=20, slowdown=50.0, walker=0, begin=0.05, end=0.1
+    "runs/walk.gif",
+    size=(480, 240),  # pixels
+    fps=20,
+    slowdown=50.0,
+    walker=0,
+    begin=0.05,  # s
+    end=0.1,
 )
 Image(film)
 

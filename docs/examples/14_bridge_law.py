@@ -2,8 +2,8 @@
 A bridge law of your own
 ========================
 
-Write the law of the capillary bridges as a Python function, and run a walker with it. Here the force is constant up to
-the gap at which the bridge breaks.
+Write the law of the capillary bridges as a Python function, and run a walker with it. Here the
+capillary force is constant up to the gap at which the bridge breaks.
 """
 
 from pathlib import Path
@@ -43,7 +43,10 @@ liquid.law = ["young-laplace", "willett", "rabinovich", "soulie"]
 """)
 sweep = walkers.sweep("runs/laws.toml")
 print(f"constant: {1e3 * run.result['velocity']:.2f} mm/s")
-print((sweep.table().set_index("liquid.law")["velocity"] * 1e3).round(2).to_string())
+velocities = 1e3 * sweep.table().set_index("liquid.law")["velocity"]
+print(velocities.round(2).to_string())
 
 # %%
+# The figure of the sweep has a point for each law.
+
 sweep.plot("runs/laws.png")
