@@ -1,28 +1,30 @@
-"""Run cases and sweeps, find their results, and draw, film, report and export them: the commands as functions."""
+"""The commands as functions: run cases and sweeps, find them, and draw, film and export them.
+
+The package `walkers` has the public names of this module. It holds no physics and no formats of
+files: each function calls the room that does the work.
+"""
 
 from __future__ import annotations
 
 import shlex
 import warnings
 from base64 import b64encode
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
-from inspect import signature
 from mimetypes import guess_type
 from pathlib import Path
-from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, Literal
 
 from walkers import DEFAULT_OUT
 from walkers.errors import InputError, Problem, apply_all, check_utf8, expected_of, input_error
 from walkers.files import read_json
 from walkers.inputs.sweep import load_sweep
-from walkers.postprocess.measure import results
 from walkers.postprocess.measure.motion import Motion, read_motion
-from walkers.postprocess.measure.results import Results
+from walkers.postprocess.measure.results import Results, ensure_measured, read_results
+from walkers.postprocess.measure.results import text as result_text
 from walkers.postprocess.measure.tables import read_table
 from walkers.postprocess.show.drawing import FORMATS, check_place, save_figure
 from walkers.postprocess.show.figures import plot_run
@@ -37,7 +39,7 @@ from walkers.runner import run_directory
 from walkers.runner.audit import check_audit
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import RunBusy
-from walkers.runs.by_hand import as_run, take_in
+from walkers.runs.by_hand import as_run, take_in, write_folder
 from walkers.runs.comparison import Comparison, Side, compare_runs
 from walkers.runs.listing import run_text
 from walkers.runs.making import make_runs, progress_at
@@ -52,17 +54,17 @@ from walkers.runs.names import (
     refusing,
 )
 from walkers.runs.status import state_at, worst_status
-from walkers.sweeps import table as of_points
 from walkers.sweeps.accuracy import measure_accuracy
 from walkers.sweeps.climbing import conditions_in, summarise_climbs
 from walkers.sweeps.climbing_output import write_climbs
 from walkers.sweeps.figure import column_of, figure_of
-from walkers.sweeps.figure_options import FigureOptions
+from walkers.sweeps.figure_options import FigureOptions, Log
 from walkers.sweeps.record import SweepRecord, read_sweep_record
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import SweepOptions, run_sweep
 from walkers.sweeps.site import load_site
 from walkers.sweeps.spread import Spread, figures_of_spread, run_spread
+from walkers.sweeps.table import SweepTable, describe_status, short_text, table_of
 from walkers.sweeps.workers import Failure
 
 if TYPE_CHECKING:
@@ -77,16 +79,18 @@ if TYPE_CHECKING:
     from walkers.inputs.tables.case import Case
 
 Export = Literal["deck", "vtk", "lammps", "archive"]
-EXPORTS = {
-    "deck": "walkers.runs.by_hand:write_folder",
-    "vtk": "walkers.postprocess.show.paraview:write_vtk",
-    "lammps": "walkers.postprocess.show.lammps:write_trajectory",
-    "archive": "walkers.archive.writing:write_archive",
+"""Forms of exports."""
+
+_OPTIONS_OF_FORMS: Mapping[str, tuple[str, ...]] = {
+    "deck": (),
+    "vtk": ("every",),
+    "lammps": ("every",),
+    "archive": ("dumps", "authors", "licence"),
 }
-"""Functions that write the forms of exports."""
+"""Options of `Run.export` that each form takes."""
 
 
-# --- names ------------------------------------------------------------------------------------------------------------
+# --- names ----------------------------------------------------------------------------------------
 
 
 def load(
@@ -94,15 +98,27 @@ def load(
 ) -> Run | Sweep:
     """Find a sweep, or a run, finished or not.
 
-    `InputError` if it does not exist or cannot be read; `EngineFailure` if a case is given and no engine is installed.
-
     Parameters
     ----------
     reference
-        The directory of a run or a sweep, its name in the folder ``out``, or a case (resolved, tables, file or shipped
-        name), which means its run with the installed engine.
+        The directory of a run or a sweep, its name in the folder ``out``, or a case (resolved,
+        tables, file or shipped name), which means its run with the installed engine.
+    out
+        Folder of the run directories.
     changes
         Other values of the case, by dotted keys.
+
+    Returns
+    -------
+    Run or Sweep
+        What the reference means. Nothing is run.
+
+    Raises
+    ------
+    InputError
+        If it does not exist or cannot be read.
+    EngineFailure
+        If a case is given and no engine is installed.
 
     Examples
     --------
@@ -119,7 +135,7 @@ def load(
     else:
         raise not_a_run(named.given, named.kind)
     if run_directory.is_finished(run.check().directory):
-        results.read_results(run.directory)  # refuses a result that cannot be read
+        read_results(run.directory)  # refuses a result that cannot be read
     return run
 
 
@@ -130,49 +146,58 @@ def _run_of_case(named: Reference) -> Run:
     if run_directory.is_finished(place) or is_begun(place):
         return Run(place, requested=case)
     name = str(named.given) if isinstance(named.given, (str, Path)) else case.name
-    settings = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in named.changes.items()]
-    command = " ".join(["walkers run", name, *settings])
+    command = f"walkers run {name}"
+    for key, value in named.changes.items():
+        command += f" --set {shlex.quote(f'{key}={value}')}"
     raise input_error(name, f"no finished run in {named.folder}; first do: {command}")
 
 
 def directory_of(
     reference: str | Path, out: str | Path = DEFAULT_OUT, changes: Changes = None
 ) -> Path:
-    """The directory that a user names, whatever it contains; for a case, the directory of its run."""
+    """The directory that a user names, whatever it contains.
+
+    For a case, it is the directory of its run. The arguments and errors are those of `load`.
+    """
     named = find(reference, out, changes)
-    return load(named).directory if named.means_case else named.path
+    if named.means_case:
+        return load(named).directory
+    return named.path
 
 
-# --- runs -------------------------------------------------------------------------------------------------------------
+# --- runs -----------------------------------------------------------------------------------------
 
 
 class Pictures(list[Path]):
     """Files of pictures, which a notebook shows."""
 
     def _repr_html_(self) -> str:
-        """The contents of the files: a notebook keeps them. A PDF is shown by its name."""
-        shown = (
-            (escape(path.name), guess_type(path)[0], b64encode(path.read_bytes()).decode())
-            for path in self
-        )
-        return "".join(
-            f'<p><img alt="{name}" src="data:{kind};base64,{content}">'
-            for name, kind, content in shown
-        )
+        """Show the pictures; the notebook keeps their contents. A PDF is shown by its name."""
+        page = ""
+        for path in self:
+            name = escape(path.name)
+            kind = guess_type(path)[0]
+            content = b64encode(path.read_bytes()).decode()
+            page += f'<p><img alt="{name}" src="data:{kind};base64,{content}">'
+        return page
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run: finished, running, interrupted or failed. Its results raise `InputError` until it is finished.
+    """A run: finished, running, interrupted or failed.
+
+    Its results, tables and pictures raise `InputError` until it is finished.
 
     Attributes
     ----------
     directory
-        The run directory. A run that is not finished is in the folder of this name with ``.incomplete`` appended.
+        The run directory. A run that is not finished is in the folder of this name with
+        ``.incomplete`` appended.
     cached
         Whether the run existed before.
     requested
-        The requested case; None: the case that made the run, whose numbers may have other sources.
+        The case that was asked for. None: the case that made the run, whose numbers may have other
+        sources.
     """
 
     directory: Path
@@ -188,7 +213,7 @@ class Run:
         return f"Run({self.directory}: {run_text(self._files)})"
 
     def check(self) -> Run:
-        """The run itself; `InputError` if a file that describes it cannot be read."""
+        """Return the run itself; raise `InputError` if a file that describes it cannot be read."""
         readable_case(self.directory)
         return self
 
@@ -199,8 +224,13 @@ class Run:
 
     @property
     def progress(self) -> Progress | None:
-        """Progress of a running run, in any process; None between segments, and if it is not running."""
-        return progress_at(self.directory) if run_directory.is_locked(self.directory) else None
+        """Progress of a running run, in any process.
+
+        None between segments, and if the run is not running.
+        """
+        if not run_directory.is_locked(self.directory):
+            return None
+        return progress_at(self.directory)
 
     @property
     def finished_directory(self) -> Path:
@@ -212,20 +242,20 @@ class Run:
     @property
     def _files(self) -> Path:
         """The directory that holds the files now."""
-        return (
-            self.directory
-            if run_directory.is_finished(self.directory)
-            else run_directory.unfinished(self.directory)
-        )
+        if run_directory.is_finished(self.directory):
+            return self.directory
+        return run_directory.unfinished(self.directory)
 
     @property
     def _state(self) -> str:
         """The status of an unfinished run, and how to continue it."""
-        if (status := self.status) == "running":
-            return f"running{f': {progress.text}' if (progress := self.progress) else ''}"
+        status = self.status
+        if status == "running":
+            progress = self.progress
+            return f"running: {progress.text}" if progress else "running"
         failure = self._files / run_directory.FAILURE_NAME
-        text = f": {read_json(failure).get('message')}" if failure.is_file() else ""
-        return f"{status}{text}; continue it with: walkers run {self.directory}"
+        reason = f": {read_json(failure).get('message')}" if failure.is_file() else ""
+        return f"{status}{reason}; continue it with: walkers run {self.directory}"
 
     @cached_property
     def case(self) -> Case:
@@ -239,8 +269,8 @@ class Run:
 
     @property
     def result(self) -> Results:
-        """The result: numbers in SI units by name, with bands and numerical errors where these are measured."""
-        return results.read_results(self.finished_directory, self.origins)
+        """The result: numbers in SI units by name, with bands and numerical errors if measured."""
+        return read_results(self.finished_directory, self.origins)
 
     @property
     def motion(self) -> Motion:
@@ -258,14 +288,25 @@ class Run:
         return self.table("walkers")
 
     def table(self, name: str) -> pd.DataFrame:
-        """A table of the run, see `walkers.postprocess.measure.tables.read_table`."""
+        """Read a table of the run in SI units.
+
+        Parameters
+        ----------
+        name
+            Name of the table, such as ``cycles``, ``meetings`` or ``bed``.
+
+        Raises
+        ------
+        InputError
+            If the run is not finished or has no such table.
+        """
         return read_table(self.finished_directory, name)
 
     def describe(self) -> str:
         """The result as text in mm, mm/s and degrees; of an unfinished run, its progress."""
         if not run_directory.is_finished(self.directory):
             return f"{self.directory.name}: {self._state}"
-        return results.text(self.result, cached=self.cached)
+        return result_text(self.result, cached=self.cached)
 
     def _repr_html_(self) -> str:
         """The result in a notebook: a table with errors, units and warnings, and the parameters."""
@@ -276,32 +317,120 @@ class Run:
     def plot(
         self, to: str | Path | None = None, formats: str | Sequence[str] = ("png",)
     ) -> Pictures:
-        """Draw the figures and return their files; see `walkers.postprocess.show.figures.plot_run`."""
+        """Draw the figures of the run: path, orientation and gait, or climbs.
+
+        Parameters
+        ----------
+        to
+            Folder of the figures; default: the run directory.
+        formats
+            Formats of the figures: png, svg or pdf.
+
+        Returns
+        -------
+        Pictures
+            The written files, which a notebook shows.
+
+        Raises
+        ------
+        InputError
+            If a format does not exist, or ``to`` is the name of a picture.
+        """
         return Pictures(plot_run(self.finished_directory, _path(to), formats))
 
     def render(
         self, to: str | Path | None = None, *, images: int = 6, walker: int | None = None
     ) -> Pictures:
-        """Render pictures at several times; see `walkers.postprocess.show.series.render_series`."""
-        return Pictures(
-            render_series(self.finished_directory, _path(to), images=images, walker=walker)
-        )
+        """Render pictures of the beads at several times in one file.
+
+        Parameters
+        ----------
+        to
+            The file, a PNG; default: ``series.png`` or, of one walker, ``walker.png`` in the run
+            directory.
+        images
+            Largest number of pictures, evenly spaced through the drive.
+        walker
+            Number of the walker to show by itself, from 0; default: the first of independent
+            walkers, otherwise all beads.
+
+        Returns
+        -------
+        Pictures
+            The written file, which a notebook shows.
+
+        Raises
+        ------
+        InputError
+            If the file is no PNG, or the run has no such walker.
+        """
+        pictures = render_series(self.finished_directory, _path(to), images=images, walker=walker)
+        return Pictures(pictures)
 
     def film(
-        self, to: str | Path | None = None, *, progress: bool | None = None, **options: Any
+        self,
+        to: str | Path | None = None,
+        *,
+        size: tuple[int, int] = FilmOptions.size,
+        fps: int = FilmOptions.fps,
+        slowdown: float | None = None,
+        walker: int | None = None,
+        begin: float = 0.0,
+        end: float | None = None,
+        progress: bool | None = None,
     ) -> Path:
-        """Render a film with `walkers.postprocess.show.film_options.FilmOptions`, such as ``slowdown``."""
+        """Render a film.
+
+        Parameters
+        ----------
+        to
+            The file, .mp4 or .gif; default: ``film.mp4`` in the run directory.
+        size
+            Width and height in pixels.
+        fps
+            Frames per second.
+        slowdown
+            Slow motion factor; default: 1, 2, 5, 10, ..., chosen so that the film lasts 5 to 10 s.
+        walker
+            Number of the walker to show by itself, from 0; default: the first of independent
+            walkers, otherwise all beads.
+        begin
+            Physical time of the first frame since the start of the drive, s.
+        end
+            Physical time of the last frame, s; default: the end of the run.
+        progress
+            Show the progress; None: only in notebooks.
+
+        Returns
+        -------
+        Path
+            The written file.
+
+        Raises
+        ------
+        InputError
+            If the format cannot hold such a film, the run has no such walker, or no frame is
+            between ``begin`` and ``end``.
+        WalkersError
+            If ffmpeg fails.
+        """
+        options = FilmOptions(
+            size=size, fps=fps, slowdown=slowdown, walker=walker, begin=begin, end=end
+        )
         with progress_of(self.case.name, progress) as advance:
-            return render_film(
-                self.finished_directory, _path(to), FilmOptions(**options), on_progress=advance
-            )
+            return render_film(self.finished_directory, _path(to), options, on_progress=advance)
 
     def view(self, *, height: int = 480) -> k3d.Plot:
-        """An interactive 3-D view of the beads for a notebook, ``height`` pixels high.
+        """Make an interactive 3-D view of the beads for a notebook.
+
+        Parameters
+        ----------
+        height
+            Height in pixels.
 
         Examples
         --------
-        >>> len(walkers.run("fig1b", tmp).view().objects)  # two beads, their necks, the floor, the lines on it
+        >>> len(walkers.run("fig1b", tmp).view().objects)  # beads, necks, substrate, its lines
         5
         """
         return player_of(read_motion(self.finished_directory), height=height)[0]
@@ -309,7 +438,20 @@ class Run:
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report, with the figure of the run's spread if it has one.
 
-        See `walkers.postprocess.show.report.run.report_run`.
+        Parameters
+        ----------
+        to
+            The file; default: ``report.html`` in the run directory.
+
+        Returns
+        -------
+        Path
+            The written file.
+
+        Raises
+        ------
+        InputError
+            If the file is no HTML file in an existing folder.
 
         Examples
         --------
@@ -322,7 +464,24 @@ class Run:
     def spread(
         self, points: int = 32, *, progress: bool | None = None, engine: str | None = None
     ) -> Spread:
-        """Run the case with uncertain values drawn from their ranges; see `walkers.sweeps.spread.run_spread`."""
+        """Run the case with uncertain values drawn from their ranges.
+
+        From then on, the texts and reports of the run contain the bands.
+
+        Parameters
+        ----------
+        points
+            Number of draws.
+        progress
+            Show the progress; None: only in notebooks.
+        engine
+            Name or path of the binary; default: the installed one.
+
+        Returns
+        -------
+        walkers.sweeps.spread.Spread
+            The bands of the result, 5 to 95 %.
+        """
         case = self.requested or self.case
         with progress_of(f"{case.name}, spread", progress) as advance:
             return run_spread(
@@ -337,7 +496,29 @@ class Run:
     def accuracy(
         self, *, progress: bool | None = None, engine: str | None = None
     ) -> dict[str, Any]:
-        """Measure the numerical errors, for the result; see `walkers.sweeps.accuracy.measure_accuracy`.
+        """Measure the numerical errors of the result, at half the time step and with harder beads.
+
+        From then on, the texts and reports of the run contain the errors.
+
+        Parameters
+        ----------
+        progress
+            Show the progress; None: only in notebooks.
+        engine
+            Name or path of the binary; default: the installed one.
+
+        Returns
+        -------
+        dict
+            The contents of ``accuracy.json``, as `walkers.sweeps.accuracy.measure_accuracy` lists
+            them.
+
+        Raises
+        ------
+        InputError
+            If the run has no walkers, or is not of the installed engine and program.
+        SweepStopped
+            If a run fails.
 
         Examples
         --------
@@ -350,40 +531,100 @@ class Run:
                 self.finished_directory, SweepOptions(), engine=engine, on_progress=advance
             )
 
-    def export(self, form: Export, to: str | Path | None = None, **options: Any) -> Path:
-        """Write the run for other programs; the functions of `EXPORTS` take the options, such as ``every``.
+    def export(
+        self,
+        form: Export,
+        to: str | Path | None = None,
+        *,
+        every: int | None = None,
+        dumps: bool = True,
+        authors: Sequence[str] = (),
+        licence: str | None = None,
+    ) -> Path:
+        """Write the run for other programs.
 
-        ``to`` is a file, for ``vtk`` and ``deck`` a folder. None: in the run directory, for ``archive`` and ``deck`` in
-        the current folder.
+        Parameters
+        ----------
+        form
+            ``deck``: the LIGGGHTS deck of the case. ``vtk``: files for ParaView. ``lammps``: the
+            trajectory as a LAMMPS dump. ``archive``: a zip file with checksums, to publish.
+        to
+            The file, for ``vtk`` and ``deck`` a folder. Default: in the run directory, for
+            ``archive`` and ``deck`` in the current folder.
+        every
+            ``vtk``, ``lammps``: write every Nth sample; default: one per cycle; for ``lammps`` and
+            piles all.
+        dumps
+            ``archive``: whether to include the dumps of the engine.
+        authors
+            ``archive``: names of the authors of the run.
+        licence
+            ``archive``: licence of the data, such as ``CC-BY-4.0``.
+
+        Returns
+        -------
+        Path
+            The written file; for ``deck`` and ``vtk`` the main file in the folder.
+
+        Raises
+        ------
+        InputError
+            If the form does not exist or does not take an option, or the place cannot be written.
 
         Examples
         --------
         >>> walkers.run("fig1b", tmp).export("lammps", tmp / "walk.lammpstrj", every=20).name
         'walk.lammpstrj'
         """
-        write, place = writer_of(form, options), _path(to)
+        chosen = []
+        if every is not None:
+            chosen.append("every")
+        if not dumps:
+            chosen.append("dumps")
+        if authors:
+            chosen.append("authors")
+        if licence is not None:
+            chosen.append("licence")
+        check_export(form, chosen)
+        place = _path(to)
         if form == "deck":
-            return write(
-                as_run(self.case, self.directory), place or Path(f"{self.directory.name}-deck")
-            )
-        return write(self.finished_directory, place, **options)
+            case = as_run(self.case, self.directory)
+            return write_folder(case, place or Path(f"{self.directory.name}-deck"))
+        directory = self.finished_directory
+        if form == "vtk":
+            from walkers.postprocess.show.paraview import write_vtk
+
+            return write_vtk(directory, place, every=every)
+        if form == "lammps":
+            from walkers.postprocess.show.lammps import write_trajectory
+
+            return write_trajectory(directory, place, every=every)
+        from walkers.archive.writing import write_archive
+
+        return write_archive(directory, place, dumps=dumps, authors=authors, licence=licence)
 
 
-def writer_of(form: str, options: Iterable[str] = ()) -> Callable[..., Path]:
-    """The function of a form of `EXPORTS`; `InputError` if there is none, or it does not take one of the options."""
+def check_export(form: str, options: Sequence[str] = ()) -> None:
+    """Refuse a form of exports that does not exist, and options that the form does not take.
 
-    def takes(name: str, option: str) -> bool:
-        return option in signature(resolve_name(EXPORTS[name])).parameters
+    Parameters
+    ----------
+    form
+        The form, such as ``vtk``.
+    options
+        Names of the options of `Run.export` that are given.
 
-    if form not in EXPORTS:
-        raise input_error("form", f"{form!r}: {expected_of(form, EXPORTS)}")
+    Raises
+    ------
+    InputError
+        If the form is none of `Export`, or does not take one of the options.
+    """
+    if form not in _OPTIONS_OF_FORMS:
+        raise input_error("form", f"{form!r}: {expected_of(form, _OPTIONS_OF_FORMS)}")
     for option in options:
-        if not takes(form, option):
-            raise input_error(
-                option, f"is for --to {', '.join(name for name in EXPORTS if takes(name, option))}"
-            )
-    write: Callable[..., Path] = resolve_name(EXPORTS[form])
-    return write
+        if option not in _OPTIONS_OF_FORMS[form]:
+            forms = [name for name, taken in _OPTIONS_OF_FORMS.items() if option in taken]
+            raise input_error(option, f"is for --to {', '.join(forms)}")
 
 
 def _path(to: str | Path | None) -> Path | None:
@@ -399,25 +640,38 @@ def run(
     progress: bool | None = None,
     time_limit: float | None = None,
 ) -> Run:
-    """Run a case unless a finished run exists. An interrupted run continues; a deck run by hand becomes a run.
+    """Run a case unless a finished run exists.
 
-    `InputError` if the case cannot be used; `EngineFailure` if the engine fails.
+    An interrupted run continues. A deck that was run by hand becomes a run.
 
     Parameters
     ----------
     case
-        A resolved case, a case file, the name of a shipped case, a run, by its name or directory, or the folder of a
-        deck that was run by hand.
+        A resolved case, a case file, the name of a shipped case, a run, by its name or directory,
+        or the folder of a deck that was run by hand.
     out
         Folder of the run directories.
     engine
-        Name or path of the binary (`walkers.runner.binary.find_engine`).
+        Name or path of the binary; default: the installed one
+        (`walkers.runner.binary.find_engine`).
     force
         Run again. The old run is replaced when the new one is finished.
     progress
         Show the progress; None: only in notebooks.
     time_limit
         Limit of the wall time in s for each segment of the run.
+
+    Returns
+    -------
+    Run
+        The finished run.
+
+    Raises
+    ------
+    InputError
+        If the case cannot be used.
+    EngineFailure
+        If the engine fails or is missing, or another process is running the case.
 
     Examples
     --------
@@ -429,11 +683,14 @@ def run(
     {'facing': [1, -1], 'steady': [True, True]}
     """
     named = find(case, out)
-    if not force and (finished := finished_at(named)):
-        return finished
-    case, out = named.case, named.folder
-    for text in (out.absolute(), case.name):
-        check_utf8(text)
+    if not force:
+        finished = finished_at(named)
+        if finished:
+            return finished
+    case = named.case
+    out = named.folder
+    check_utf8(out.absolute())
+    check_utf8(case.name)
     binary = find_engine(engine)
     place = run_directory.run_place(case, binary, out)
     if run_directory.is_finished(place) and not force:
@@ -449,16 +706,24 @@ def run(
 
 
 def finished_at(named: Reference) -> Run | None:
-    """The finished run with a name or a directory, also of a deck that was run by hand; None for a case."""
+    """Find the finished run with a name or a directory; a deck that was run by hand becomes a run.
+
+    None for a case, and for a run that is not finished.
+    """
     if named.means_case or named.kind not in ("run", "deck"):
         return None
     if run_directory.is_deck_folder(named.path):
         take_in(named.path)
-    return _measured(Run(named.path)) if run_directory.is_finished(named.path) else None
+    if not run_directory.is_finished(named.path):
+        return None
+    return _measured(Run(named.path))
 
 
 def case_to_run(named: tuple[Reference, Run | None]) -> Case:
-    """The case of a name, or of the finished run that it means: a deck that was run by hand has no other."""
+    """The case of a name, or of the finished run that it means.
+
+    A deck that was run by hand has no other case than that of its run.
+    """
     reference, run = named
     return reference.case if run is None else run.case
 
@@ -467,24 +732,33 @@ def _measured(run: Run) -> Run:
     """The run; a finished run is measured again if its result or a table cannot be read."""
     if run_directory.is_finished(run.check().directory):
         with refusing(run.directory, "the run"):
-            results.ensure_measured(run.directory)
+            ensure_measured(run.directory)
     return run
 
 
-# --- sweeps -----------------------------------------------------------------------------------------------------------
+# --- sweeps ---------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep in its directory, beside its runs; ``failures`` are points that failed in this call of `sweep`."""
+    """A sweep in its directory; its runs are in the same folder.
+
+    Attributes
+    ----------
+    directory
+        The directory of the sweep.
+    failures
+        The points that failed in the call of `sweep` that gave this object.
+    """
 
     directory: Path
     failures: tuple[Failure, ...] = field(default=(), repr=False, compare=False)
+    _record: SweepRecord = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         """Make a path of the name of a directory; `InputError` if it has no sweep."""
         object.__setattr__(self, "directory", Path(self.directory))
-        _ = self._record
+        object.__setattr__(self, "_record", read_sweep_record(self.directory))
 
     def __repr__(self) -> str:
         """Name and numbers of points by status in a line."""
@@ -492,11 +766,11 @@ class Sweep:
 
     def summary(self) -> str:
         """The status of the points and their failures."""
-        return of_points.describe_status(self._table.frame)
+        return describe_status(self._table.frame)
 
     @property
     def status(self) -> str:
-        """``finished``, ``running``, ``failed`` (some points) or ``interrupted`` (points are missing)."""
+        """``finished``, ``running``, ``failed`` (some points) or ``interrupted`` (others)."""
         return worst_status(self._table.frame["status"])
 
     @cached_property
@@ -505,24 +779,31 @@ class Sweep:
         return [Run(self._record.out / name) for name in self._record.runs]
 
     def table(self) -> pd.DataFrame:
-        """One row per point; see `walkers.sweeps.table.load_table`. Kept once all points are finished; see `refresh`."""
+        """The table of the sweep, one row per point.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns are ``point``, the keys that vary (in the unit of the sweep file), and in SI
+            units the numbers of the results (NaN for unfinished points) and of the state of the
+            points. The table is read again until all points are finished; see `refresh`.
+        """
         return self._table.frame.copy()
 
     def refresh(self) -> Sweep:
-        """Forget the table, so that it is read again: after runs of a finished sweep were measured again or removed."""
+        """Read the table of a finished sweep again when it is needed, and return the sweep.
+
+        This is necessary after its runs were measured again or removed.
+        """
         self.__dict__.pop("_finished_table", None)
         return self
 
-    @cached_property
-    def _record(self) -> SweepRecord:
-        return read_sweep_record(self.directory)
-
     @property
-    def _table(self) -> of_points.SweepTable:
+    def _table(self) -> SweepTable:
         """The table with its results, read again as long as points are not finished."""
-        table: of_points.SweepTable | None = self.__dict__.get("_finished_table")
+        table: SweepTable | None = self.__dict__.get("_finished_table")
         if table is None:
-            table = of_points.table_of(self._record)
+            table = table_of(self._record)
             if len(table.finished) == len(table.frame):
                 self.__dict__["_finished_table"] = table
         return table
@@ -530,63 +811,161 @@ class Sweep:
     def describe(self) -> str:
         """The status of the points, their failures, and the table in mm, mm/s, nJ and degrees."""
         frame = self._table.frame
-        return f"{of_points.describe_status(frame)}\n\n{of_points.short_text(frame.drop(columns='run'))}"
+        return f"{describe_status(frame)}\n\n{short_text(frame.drop(columns='run'))}"
 
     def _repr_html_(self) -> str:
         """The table in a notebook."""
         return str(self.table()._repr_html_())  # type: ignore[operator]
 
-    def figure(self, **options: Any) -> Figure:
-        """A matplotlib figure of the table, with `walkers.sweeps.figure_options.FigureOptions`.
+    def figure(
+        self,
+        *,
+        x: str | None = None,
+        y: str | None = None,
+        hue: str | None = None,
+        panels: str | None = None,
+        log: Log | None = None,
+        theory: bool = False,
+    ) -> Figure:
+        """Make a matplotlib figure of a column of the table.
 
-        See `walkers.sweeps.figure.figure_of`.
+        Parameters
+        ----------
+        x
+            Key or column on the x axis, such as ``drive.frequency``, ``frequency`` or ``gamma0``;
+            default: the key with the most values.
+        y
+            Column of the table; default: velocity, or climbs for piles.
+        hue
+            Key or column that sets the colour, or ``none``; default: the first key that is not x.
+        panels
+            Key or column that sets the panel, or ``none`` to draw all values of further keys alike.
+        log
+            Which axes are logarithmic: ``x``, ``y`` or ``xy``.
+        theory
+            Also draw the predictions of the theory.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, which can be changed and saved.
+
+        Raises
+        ------
+        InputError
+            If a key or column does not exist, or no point is finished.
 
         Examples
         --------
         >>> walkers.sweep("fig4", tmp).figure(x="liquid.name", log="y").axes[0].get_yscale()
         'log'
         """
+        options = FigureOptions(x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)
         if in_notebook():
             import matplotlib.pyplot as plt
 
-            plt.switch_backend(
-                plt.rcParams["backend"]
-            )  # which tells the notebook how to show figures
+            # This tells the notebook how to show figures.
+            plt.switch_backend(plt.rcParams["backend"])
         return _figure(self._table, options)
 
-    def plot(self, to: str | Path | None = None, **options: Any) -> Pictures:
-        """Plot the table to a file as in `figure`; by default in the sweep's directory, named after the column."""
+    def plot(
+        self,
+        to: str | Path | None = None,
+        *,
+        x: str | None = None,
+        y: str | None = None,
+        hue: str | None = None,
+        panels: str | None = None,
+        log: Log | None = None,
+        theory: bool = False,
+    ) -> Pictures:
+        """Plot a column of the table to a file.
+
+        Parameters
+        ----------
+        to
+            The file, .png, .svg or .pdf; default: a PNG in the directory of the sweep, named after
+            the column.
+        x, y, hue, panels, log, theory
+            What the figure shows, see `figure`.
+
+        Returns
+        -------
+        Pictures
+            The written file, which a notebook shows.
+
+        Raises
+        ------
+        InputError
+            If a key or column does not exist, no point is finished, or the format is another one.
+        """
+        options = FigureOptions(x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)
         table = self._table
-        place = _path(to) or self.directory / f"{column_of(table.frame, options.get('y'))}.png"
+        place = _path(to) or self.directory / f"{column_of(table.frame, y)}.png"
         check_place(place, *(f".{form}" for form in FORMATS))
         runs = [Path(run).name for run in table.finished["run"]]
         form = place.suffix.lower()[1:]
-        return Pictures(
-            save_figure(_figure(table, options), place, runs, form, str(table.frame.attrs["sweep"]))
-        )
+        title = str(table.frame.attrs["sweep"])
+        return Pictures(save_figure(_figure(table, options), place, runs, form, title))
 
     def report(self, to: str | Path | None = None) -> Path:
-        """Write a self-contained HTML report, by default ``report.html`` in the sweep's directory."""
+        """Write a self-contained HTML report.
+
+        Parameters
+        ----------
+        to
+            The file; default: ``report.html`` in the directory of the sweep.
+
+        Returns
+        -------
+        Path
+            The written file.
+        """
         return report_sweep(self._table, _path(to) or self.directory / REPORT_NAME)
 
     def export(
-        self, form: Export = "archive", to: str | Path | None = None, **options: Any
+        self,
+        form: Export = "archive",
+        to: str | Path | None = None,
+        *,
+        dumps: bool = True,
+        authors: Sequence[str] = (),
+        licence: str | None = None,
     ) -> Path:
-        """Write the sweep and its runs as an ``archive``, the only form; see `Run.export`."""
+        """Write the sweep and its runs as an archive.
+
+        Parameters
+        ----------
+        form
+            ``archive``, the only form of sweeps.
+        to, dumps, authors, licence
+            See `Run.export`.
+
+        Returns
+        -------
+        Path
+            The zip file.
+
+        Raises
+        ------
+        InputError
+            If the form is another one, a run is not finished, or the file cannot be written.
+        """
         from walkers.archive.writing import write_archive
 
         if form != "archive":
-            raise input_error(
-                self.directory, f"is a sweep: expected one of its runs for {form}, or archive"
-            )
-        return write_archive(self.directory, _path(to), **options)
+            text = f"is a sweep: expected one of its runs for {form}, or archive"
+            raise input_error(self.directory, text)
+        return write_archive(
+            self.directory, _path(to), dumps=dumps, authors=authors, licence=licence
+        )
 
 
-def _figure(table: of_points.SweepTable, options: Mapping[str, Any]) -> Figure:
+def _figure(table: SweepTable, options: FigureOptions) -> Figure:
+    """The figure of a table, with the predictions of the theory if they are asked for."""
     from walkers.theory.prediction import predicted_column
 
-    chosen = FigureOptions(**options)
-    return figure_of(table, chosen, predicted_column if chosen.theory else None)
+    return figure_of(table, options, predicted_column if options.theory else None)
 
 
 def sweep(
@@ -602,29 +981,47 @@ def sweep(
     spread: int = 0,
     engine: str | None = None,
 ) -> Sweep:
-    """Run the missing points of a sweep on this machine or a cluster; the ``status`` in its table marks failed points.
-
-    `InputError` if the sweep or one of its points cannot be used.
+    """Run the missing points of a sweep, on this machine or a cluster.
 
     Parameters
     ----------
     sweep
         A sweep file, the name of a shipped sweep, or the tables of a sweep file.
+    out
+        Folder of the run directories, and of that of the sweep.
     jobs
         Number of parallel decks; default: one per core.
     changes
         Values that replace those in ``[set]``, by dotted keys.
+    progress
+        Show the progress; None: only in notebooks.
     site
         The site file of a cluster, TOML or Python; see `walkers.sweeps.site.load_site`.
     executor
-        Runs the decks instead of threads of this process, ``jobs`` at once; all of its workers must see the folder.
+        Runs the decks instead of threads of this process, ``jobs`` at the same time. All of its
+        workers must see the folder ``out``.
     time_limit
         Limit of the wall time in s for each deck.
     spread
-        Number of runs of each finished point with its uncertain values drawn from their ranges, for bands along the
-        sweep (columns such as ``velocity_low``); 0: none.
-    out, progress, engine
-        See `run`.
+        Number of runs of each finished point with its uncertain values drawn from their ranges, for
+        bands along the sweep (columns such as ``velocity_low``); 0: none.
+    engine
+        Name or path of the binary; default: the installed one.
+
+    Returns
+    -------
+    Sweep
+        The sweep. The ``status`` in its table marks failed points, and its ``failures`` say why
+        they failed.
+
+    Raises
+    ------
+    InputError
+        If the sweep or one of its points cannot be used.
+    EngineFailure
+        If there is no engine, or its audit failed.
+    SweepStopped
+        If a failure hits every point.
 
     Examples
     --------
@@ -636,12 +1033,13 @@ def sweep(
     folder = Path(out).resolve() if site else Path(out)
     with progress_of(points.name, progress) as advance:
         record, failures = run_sweep(points, folder, options, engine=engine, on_progress=advance)
-    failed = {failure.point for failure in failures}
-    for number, case in enumerate(points.cases(), 1) if spread else ():
-        if number - 1 not in failed:
-            with progress_of(
-                f"{points.name}, spread {number} of {len(points.rows)}", progress
-            ) as advance:
+    if spread:
+        failed = {failure.point for failure in failures}
+        for point, case in enumerate(points.cases()):
+            if point in failed:
+                continue
+            task = f"{points.name}, spread {point + 1} of {len(points.rows)}"
+            with progress_of(task, progress) as advance:
                 drawn = run_spread(
                     case, folder, options, points=spread, engine=engine, on_progress=advance
                 )
@@ -649,7 +1047,7 @@ def sweep(
     return Sweep(record.directory, tuple(failures))
 
 
-# --- several runs -----------------------------------------------------------------------------------------------------
+# --- several runs ---------------------------------------------------------------------------------
 
 
 def compare(
@@ -658,24 +1056,44 @@ def compare(
     out: str | Path = DEFAULT_OUT,
     changes: Mapping[str, Any] | None = None,
 ) -> Comparison:
-    """Compare two runs or cases, named as for `load`, in parameters and results.
+    """Compare two runs or cases in parameters and results.
 
-    The ``changes`` are of the second case, which by default is the first.
+    Parameters
+    ----------
+    first, second
+        Runs or cases, named as for `load`. The second one is the first by default.
+    out
+        Folder of the run directories.
+    changes
+        Other values of the second case, by dotted keys.
+
+    Returns
+    -------
+    walkers.runs.comparison.Comparison
+        The differences, as JSON in SI units and as text.
+
+    Raises
+    ------
+    InputError
+        If neither a second run nor changes are given, or a case cannot be read.
     """
     if second is None and not changes:
         raise input_error(first, "expected a second run, or changed values (--set KEY=VALUE)")
+    references = [
+        find(first, out),
+        find(first if second is None else second, out, changes),
+    ]
+    return compare_runs(*apply_all(_side, references))
 
-    def side(name: str | Path, changes: Changes) -> Side:
-        named = find(name, out, changes)
-        case = named.case
-        directory = named.finished_run
-        is_run = named.kind == "run" and not named.means_case
-        words = [directory.name if directory and is_run else str(name)]
-        words += [f"{key}={value}" for key, value in named.changes.items()]
-        return Side(" ".join(words), case, directory)
 
-    named = ((first, None), (first if second is None else second, changes))
-    return compare_runs(*apply_all(lambda of: side(*of), named))
+def _side(named: Reference) -> Side:
+    """A side of a comparison: a run or a case, with the words that name it."""
+    case = named.case
+    directory = named.finished_run
+    is_run = named.kind == "run" and not named.means_case
+    name = directory.name if directory and is_run else str(named.given)
+    changes = [f"{key}={value}" for key, value in named.changes.items()]
+    return Side(" ".join([name, *changes]), case, directory)
 
 
 def climb(
@@ -686,43 +1104,67 @@ def climb(
     within: float | None = None,
     to: str | Path | None = None,
 ) -> list[dict[str, Any]]:
-    """Probability, rate and speed of climbs in piles for each condition, with confidence intervals.
+    """Measure probability, rate and speed of climbs in piles, with confidence intervals.
 
-    Runs of a sweep that differ in nothing but their seed are a condition; a run by itself is another one.
+    Runs of a sweep that differ in nothing but their seed are a condition; a run by itself is
+    another one. Unfinished points of a sweep are left out, with a warning.
 
     Parameters
     ----------
     references
-        Sweeps, runs or cases of piles; further arguments as of `load`.
+        Sweeps, runs or cases of piles, named as for `load`.
+    out
+        Folder of the run directories.
+    changes
+        Other values of the cases, by dotted keys.
     within
-        Count climbs up to this time of the drive, s; None: the end of the shortest run without a climb.
+        Count climbs up to this time of the drive, s; None: the end of the shortest run without a
+        climb.
     to
         Also write the figure (.png, .svg, .pdf) or the table (.csv) to this file.
+
+    Returns
+    -------
+    list of dict
+        Numbers of each condition in SI units, as `walkers.sweeps.climbing.summarise_climbs` gives
+        them, and its name, ``condition``.
+
+    Raises
+    ------
+    InputError
+        If a reference does not exist, a run is none of a pile, or the file has another format.
     """
     if to is not None:
         check_place(Path(to), *(f".{form}" for form in FORMATS), ".csv")
-    climbs, runs = [], []
+    climbs = []
+    runs = []
     for run_or_sweep in apply_all(lambda name: load(name, out, changes), references):
-        directory = run_or_sweep.directory
-        if isinstance(run_or_sweep, Sweep):
-            table = run_or_sweep._table
-            left = len(table.frame) - len(table.finished)
-            if left:
-                text = f"{left} of {len(table.frame)} points are not finished and left out"
-                warnings.warn(f"{directory.name}: {text}", stacklevel=2)
-            conditions = [
-                (label, table.results_of(rows)) for label, rows in conditions_in(table.frame)
-            ]
-        else:
-            conditions = [("", [results.read_results(directory)])]
-        for label, of_piles in conditions:
-            words = [directory.name] if len(references) > 1 or not label else []
-            words += [label] if label else []
-            climbs.append(summarise_climbs(of_piles, within) | {"condition": ", ".join(words)})
-            runs += [result.directory.name for result in of_piles]
+        for label, results in _conditions(run_or_sweep):
+            words = []
+            if len(references) > 1 or not label:
+                words.append(run_or_sweep.directory.name)
+            if label:
+                words.append(label)
+            climbs.append(summarise_climbs(results, within) | {"condition": ", ".join(words)})
+            runs += [result.directory.name for result in results]
     if to is not None:
         write_climbs(climbs, runs, Path(to))
     return climbs
+
+
+def _conditions(run_or_sweep: Run | Sweep) -> Iterator[tuple[str, list[Results]]]:
+    """The conditions of a sweep with the results of their runs; a run is one condition."""
+    directory = run_or_sweep.directory
+    if isinstance(run_or_sweep, Run):
+        yield "", [read_results(directory)]
+        return
+    table = run_or_sweep._table
+    missing = len(table.frame) - len(table.finished)
+    if missing:
+        text = f"{missing} of {len(table.frame)} points are not finished and left out"
+        warnings.warn(f"{directory.name}: {text}", stacklevel=3)
+    for label, rows in conditions_in(table.frame):
+        yield label, table.results_of(rows)
 
 
 def calibrate(
@@ -733,9 +1175,32 @@ def calibrate(
     progress: bool | None = None,
     engine: str | None = None,
 ) -> Outcome:
-    """Calibrate unknown parameters to facts; an interrupted calibration continues. Arguments: see `sweep`.
+    """Calibrate unknown parameters to facts. An interrupted calibration continues.
 
     `walkers.calibration.report.write_outcome` writes tables and figures of the outcome.
+
+    Parameters
+    ----------
+    calibration
+        A calibration file, or the name of a shipped calibration.
+    out
+        Folder of the run directories.
+    jobs
+        Number of parallel decks; default: one per core.
+    progress
+        Show the progress; None: only in notebooks.
+    engine
+        Name or path of the binary; default: the installed one.
+
+    Returns
+    -------
+    walkers.calibration.calibrate.Outcome
+        The calibrated parameters, with what they predict.
+
+    Raises
+    ------
+    InputError
+        If the calibration or one of its cases cannot be used.
     """
     from walkers.calibration import calibrate
     from walkers.calibration.file import load_calibration
@@ -750,9 +1215,28 @@ def calibrate(
 
 
 def predict(case: Given, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> dict[str, Any]:
-    """The prediction of the theory for a case, SI units, under ``engine`` with the result of its run if there is one.
+    """Predict the motion of the dimer of a case by the theory.
 
-    See `walkers.theory.prediction.predict`.
+    Parameters
+    ----------
+    case
+        A case (resolved, tables, file or shipped name), or the name or directory of a run.
+    out
+        Folder of the run directories.
+    changes
+        Other values of the case, by dotted keys.
+
+    Returns
+    -------
+    dict
+        Numbers in SI units, as `walkers.theory.prediction.predict` lists them. ``outside`` says
+        where the case is outside of the range of the paper's measurements, or None. ``engine`` is
+        the result of the finished run of the case, or None.
+
+    Raises
+    ------
+    InputError
+        If the case cannot be used, or the theory does not apply to it.
     """
     from walkers.theory import prediction
     from walkers.theory.paper_range import outside_of_the_paper
@@ -765,6 +1249,6 @@ def predict(case: Given, out: str | Path = DEFAULT_OUT, changes: Changes = None)
     predicted["outside"] = outside_of_the_paper(named.case)
     predicted["engine"] = None
     if named.finished_run:
-        with suppress(InputError):  # a result that cannot be read
+        with suppress(InputError):  # the result cannot be read
             predicted["engine"] = Run(named.finished_run, requested=named.case).result.as_dict()
     return predicted

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from walkers import DEFAULT_OUT
-from walkers.api import Export, directory_of, writer_of
+from walkers.api import Export, check_export, directory_of
 from walkers.commands.options import LookupOptions, OutOption, RunOrSweepArgument, refuse, tell
 from walkers.errors import apply_all
 from walkers.runner.run_directory import UNFINISHED
@@ -74,7 +74,7 @@ def export(
     """
     given = _given(options)
     if form == "deck":
-        writer_of(form, given)  # refuses options of other formats
+        check_export(form, list(given))
         _export_deck(name, to, lookup)
     else:
         print(lookup.load(name).export(form, to, **given))
