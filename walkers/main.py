@@ -1,4 +1,9 @@
-"""The program ``walkers``. Exit status: 0 done, 1 a run failed, 2 bad input, 130 interrupted, 143 or 129 terminated."""
+"""The program ``walkers``: its help, signals, messages and exit statuses.
+
+The exit status is 0 if the command is done, 1 if a run failed, 2 for bad input, 130 after Ctrl-C,
+143 if the program was terminated, and 129 if its terminal was closed. The commands are in
+`walkers.commands`.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +14,7 @@ import subprocess
 import sys
 import textwrap
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from itertools import groupby
@@ -22,25 +27,50 @@ from walkers.errors import InputError, WalkersError, shortened
 from walkers.text import printable
 
 if TYPE_CHECKING:
-    from cyclopts import App
+    from cyclopts import App, CycloptsError
     from cyclopts.help import HelpPanel
 
 _SUMMARY = "Wet granular walkers, simulated with LIGGGHTS."
+"""What the program is, in its help."""
+
 _OPTIONS = {
     "--help, -h": "Display this message and exit.",
-    "--version": "Show the versions of the package (with its commit, if known) and of the engine, and exit.",
-    "--install-completion": "Install the completion of commands, options, cases, runs and sweeps for your shell.",
+    "--version": (
+        "Show the versions of the package (with its commit, if known) and of the engine, and exit."
+    ),
+    "--install-completion": (
+        "Install the completion of commands, options, cases, runs and sweeps for your shell."
+    ),
 }
-_LEFT, _WIDE = 24, 80
-"""Largest width of the first column of the help, and width of the help."""
+"""Options of the program without a command, in its help."""
+
+_LARGEST_NAME_WIDTH = 24
+"""Largest width of the first column of the help, characters."""
+
+_HELP_WIDTH = 80
+"""Width of the help, characters."""
+
 _LONGEST_MESSAGE = 1000
+"""Largest length of a message about the command line, characters."""
+
+_FAILED = 1
+"""Exit status of a command whose run failed."""
+
+_BAD_INPUT = 2
+"""Exit status for bad input."""
+
 _INTERRUPTED = 130
+"""Exit status after Ctrl-C."""
+
 _ENGINE_SECONDS = 10.0
-"""Longest time, s, for the engine to print its version."""
+"""Longest time for the engine to print its version, s."""
 
 
 class _Terminated(BaseException):
-    """SIGTERM, or SIGHUP of a terminal that is closed, as an exception: engines are stopped on the way out."""
+    """SIGTERM, or SIGHUP of a terminal that is closed, as an exception.
+
+    Thus the engines are stopped before the program ends.
+    """
 
     def __init__(self, number: int) -> None:
         self.status = 128 + number
@@ -52,27 +82,40 @@ def _on_signal(number: int, _frame: FrameType | None) -> NoReturn:
 
 
 def main(arguments: list[str] | None = None, app: App | None = None) -> NoReturn:
-    """Run the program, or another app of `new_app`, with the arguments of the command line, and exit."""
+    """Run the program or another app, and exit.
+
+    Parameters
+    ----------
+    arguments
+        The words of the command line; default: those of this process.
+    app
+        An app of `new_app`; default: the program.
+    """
     _prepare_streams()
-    os.environ["MPLBACKEND"] = (
-        "agg"  # the program opens no windows, and matplotlib refuses unknown names
-    )
+    # The program opens no windows, and matplotlib refuses unknown names of backends.
+    os.environ["MPLBACKEND"] = "agg"
     signal.signal(signal.SIGTERM, _on_signal)
-    if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:  # nohup
+    is_ignored = signal.getsignal(signal.SIGHUP) == signal.SIG_IGN  # as by nohup
+    if not is_ignored:
         signal.signal(signal.SIGHUP, _on_signal)
-    warnings.showwarning = lambda message, *_, **__: print(
-        f"walkers: warning: {message}", file=sys.stderr
-    )
-    sys.exit(_status(sys.argv[1:] if arguments is None else arguments, app))
+    warnings.showwarning = _show_warning
+    tokens = sys.argv[1:] if arguments is None else arguments
+    sys.exit(_status(tokens, app))
+
+
+def _show_warning(message: object, *_position: object, **_options: object) -> None:
+    """Print a warning as the program prints messages."""
+    print(f"walkers: warning: {message}", file=sys.stderr)
 
 
 def _prepare_streams() -> None:
-    """Make output possible where it was closed, and where its encoding lacks letters such as Γ and ²."""
+    """Open streams that are closed, and print letters that their encoding lacks, such as Γ."""
     for descriptor in (0, 1, 2):
         try:
             os.fstat(descriptor)
-        except OSError:  # otherwise the next file to be opened, such as a lock, would be the output
-            os.open(os.devnull, os.O_RDWR)  # which takes the lowest free number
+        except OSError:
+            # A file takes the lowest free number, so the next one would be the output.
+            os.open(os.devnull, os.O_RDWR)
     if sys.stdout is None:
         sys.stdout = open(1, "w", encoding="utf-8")  # noqa: SIM115
     if sys.stderr is None:
@@ -98,7 +141,10 @@ def _status(tokens: list[str], app: App | None = None) -> int:
 
 
 def print_help() -> None:
-    """Print the commands and options of the program. Without cyclopts and rich this takes a tenth of the time."""
+    """Print the commands and options of the program.
+
+    Without cyclopts and rich this takes a tenth of the time.
+    """
     print(f"Usage: walkers COMMAND [OPTIONS]\n\n{_SUMMARY}")
     for heading, group in groupby(ALL_COMMANDS, lambda command: command.heading):
         _print_panel(heading, {command.name: command.summary for command in group})
@@ -109,16 +155,18 @@ def _print_panel(title: str, meanings: Mapping[str, str]) -> None:
     """Print names and their meanings in two columns below a heading."""
     if not meanings:
         return
-    left = min(_LEFT, max(map(len, meanings)))
+    width = min(_LARGEST_NAME_WIDTH, max(len(name) for name in meanings))
+    margin = " " * (width + 4)
     print(f"\n{title}:")
     for name, meaning in meanings.items():
-        first, *more = textwrap.wrap(meaning, _WIDE - left - 4) or [""]
-        lines = (
-            [f"  {name:{left}}  {first}"]
-            if len(name) <= left
-            else [f"  {name}", f"{'':{left + 4}}{first}"]
-        )
-        print("\n".join([*lines, *(f"{'':{left + 4}}{line}" for line in more)]))
+        first, *rest = textwrap.wrap(meaning, _HELP_WIDTH - len(margin)) or [""]
+        if len(name) <= width:
+            print(f"  {name:{width}}  {first}")
+        else:
+            print(f"  {name}")
+            print(f"{margin}{first}")
+        for line in rest:
+            print(f"{margin}{line}")
 
 
 class _PlainHelp:
@@ -127,20 +175,24 @@ class _PlainHelp:
     def __call__(self, _console: object, _options: object, panel: HelpPanel) -> None:
         meanings = {}
         for entry in panel.entries:
-            default = f" [default: {entry.default}]" * (entry.default not in (None, "False"))
-            meanings[", ".join(entry.display_labels_with_metavar)] = (
-                _plain(entry.description) + default
-            )
+            names = ", ".join(entry.display_labels_with_metavar)
+            meaning = _plain(entry.description)
+            if entry.default not in (None, "False"):
+                meaning += f" [default: {entry.default}]"
+            meanings[names] = meaning
         _print_panel(str(panel.title), meanings)
 
     def render_usage(self, _console: object, _options: object, usage: Any) -> None:
+        """Print how the command is called."""
         print(f"Usage: {_plain(usage)}")
 
     def render_description(self, _console: object, _options: object, description: Any) -> None:
-        print(f"\n{textwrap.fill(_plain(description), _WIDE)}")
+        """Print what the command does."""
+        print(f"\n{textwrap.fill(_plain(description), _HELP_WIDTH)}")
 
 
 def _plain(text: Any) -> str:
+    """A text of cyclopts without its markup."""
     return str(getattr(text, "primary_renderable", text)).strip()
 
 
@@ -163,6 +215,11 @@ def new_app(name: str, summary: str | None = None) -> App:
         How the app is called, such as ``walkers``; messages and help name it so.
     summary
         The first line of its help; default: that of its default command.
+
+    Returns
+    -------
+    cyclopts.App
+        An app without commands.
     """
     from cyclopts import App, Parameter
 
@@ -188,68 +245,76 @@ def print_version() -> None:
     from walkers.runner.failures import EngineMissing
     from walkers.runner.provenance import PROJECT, software
 
-    ours = software()
-    package = f"{PROJECT} {ours['granular_walkers']}" + (
-        f" (commit {ours['commit']})" if ours["commit"] else ""
-    )
+    versions = software()
+    package = f"{PROJECT} {versions['granular_walkers']}"
+    if versions["commit"]:
+        package += f" (commit {versions['commit']})"
     print(package)
     try:
         path = find_engine().path
     except EngineMissing as missing:
         print(missing)
         return
-    version, command = None, [str(path), "-log", "none", "-in", "/dev/null"]
-    with (
-        TemporaryDirectory() as folder,
-        suppress(OSError, subprocess.TimeoutExpired),
-    ):  # it writes files there
-        how: dict[str, Any] = {
-            "cwd": folder,
-            "stdin": subprocess.DEVNULL,
-            "timeout": _ENGINE_SECONDS,
-        }
-        version = version_in(
-            subprocess.run(command, capture_output=True, check=False, **how).stdout
+    version = None
+    command = [str(path), "-log", "none", "-in", "/dev/null"]
+    with TemporaryDirectory() as folder, suppress(OSError, subprocess.TimeoutExpired):
+        engine = subprocess.run(
+            command,
+            cwd=folder,  # the engine writes files into it
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            check=False,
+            timeout=_ENGINE_SECONDS,
         )
+        version = version_in(engine.stdout)
     print(f"{version or 'an engine that does not name its version'}, {path}")
 
 
 def _report_stop(stop: BaseException, tokens: list[str], app: App) -> int:
-    from cyclopts import CycloptsError, MissingArgumentError, UnusedCliTokensError
+    """Print why a command has stopped and return the exit status; raise unexpected errors."""
+    from cyclopts import CycloptsError
 
     if isinstance(stop, SystemExit):
         return stop.code if isinstance(stop.code, int) else 0
-    if isinstance(stop, InputError):
-        stop = stop.renamed(
-            lambda source: source if source in tokens else _options_of(source, tokens, app)
-        )
+    if isinstance(stop, (_Terminated, KeyboardInterrupt, WalkersError)):
+        return _report_own_stop(stop, tokens, app)
+    if _is_broken_pipe(stop):
+        # The interpreter flushes the output once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return 0
+    message = _message_of_system(stop)
+    if not message:
+        if not isinstance(stop, CycloptsError):
+            raise stop
+        message = _message_of_command_line(stop, app)
+    return _tell(message, _BAD_INPUT)
+
+
+def _report_own_stop(
+    stop: _Terminated | KeyboardInterrupt | WalkersError, tokens: list[str], app: App
+) -> int:
+    """Print a signal or an error of the package, and return the exit status."""
     if isinstance(stop, _Terminated):
         return _tell(str(stop), stop.status)
-    statuses = {InputError: 2, WalkersError: 1, KeyboardInterrupt: _INTERRUPTED}
-    if status := next((status for kind, status in statuses.items() if isinstance(stop, kind)), 0):
-        return _tell(str(stop) or "interrupted", status)
-    # The reader of the output, such as head, has closed it; this is not a failure.
-    if isinstance(stop if isinstance(stop, OSError) else stop.__context__, BrokenPipeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # the end of the interpreter flushes it again
-        return 0
-    if message := _message_of_system(stop):
-        return _tell(message, 2)
-    if not isinstance(stop, CycloptsError):
-        raise stop
-    unused = stop.unused_tokens if isinstance(stop, UnusedCliTokensError) else None
-    message = f"Unexpected: {' '.join(unused)}." if unused else str(stop)
-    if (
-        isinstance(stop, MissingArgumentError)
-        and stop.argument
-        and (choices := stop.argument.get_choices())
-    ):
-        message += f" Choose from: {', '.join(choices)}."
-    help_command = " ".join([*app.name, *(stop.command_chain or ()), "--help"])
-    return _tell(f"{shortened(printable(message), _LONGEST_MESSAGE)} See: {help_command}", 2)
+    if isinstance(stop, KeyboardInterrupt):
+        return _tell(str(stop) or "interrupted", _INTERRUPTED)
+    if isinstance(stop, InputError):
+
+        def name_of(source: str) -> str:
+            return source if source in tokens else _options_of(source, tokens, app)
+
+        return _tell(str(stop.renamed(name_of)), _BAD_INPUT)
+    return _tell(str(stop), _FAILED)
+
+
+def _is_broken_pipe(stop: BaseException) -> bool:
+    """Whether the reader of the output, such as head, has closed it, which is not a failure."""
+    error = stop if isinstance(stop, OSError) else stop.__context__
+    return isinstance(error, BrokenPipeError)
 
 
 def _message_of_system(stop: BaseException) -> str:
-    """Message about a path that cannot be read or written, or about an impossible clock; empty for other errors."""
+    """Message about a path that cannot be used or about an impossible clock; else empty."""
     if isinstance(stop, OSError):
         return f"{stop.filename}: {stop.strerror}" if stop.filename else str(stop)
     if isinstance(stop, OverflowError) and _clock_is_wrong():
@@ -266,16 +331,46 @@ def _clock_is_wrong() -> bool:
     return False
 
 
+def _message_of_command_line(stop: CycloptsError, app: App) -> str:
+    """Message about an option or argument that a command does not take, or lacks."""
+    from cyclopts import MissingArgumentError, UnusedCliTokensError
+
+    message = str(stop)
+    if isinstance(stop, UnusedCliTokensError) and stop.unused_tokens:
+        message = f"Unexpected: {' '.join(stop.unused_tokens)}."
+    if isinstance(stop, MissingArgumentError) and stop.argument:
+        choices = stop.argument.get_choices()
+        if choices:
+            message += f" Choose from: {', '.join(choices)}."
+    commands: Sequence[str] = stop.command_chain or ()
+    help_command = " ".join([*app.name, *commands, "--help"])
+    return f"{shortened(printable(message), _LONGEST_MESSAGE)} See: {help_command}"
+
+
 def _options_of(names: str, tokens: list[str], app: App) -> str:
-    """The options of the command for arguments of a function of the package, such as ``begin, end``."""
+    """Options of the command that is called, for arguments of a function of the package.
+
+    Parameters
+    ----------
+    names
+        Names of arguments, such as ``begin, end``; other names are returned as they are.
+    tokens
+        The words of the command line.
+    app
+        The app that is called.
+    """
     _, apps, _ = app.parse_commands(tokens)
+    options = {}
     arguments = apps[-1].assemble_argument_collection()
-    options = {argument.name[2:]: argument.name for argument in arguments}
-    options |= {argument.field_info.name: argument.name for argument in arguments}
+    for argument in arguments:
+        options[argument.name.removeprefix("--")] = argument.name
+    for argument in arguments:
+        options[argument.field_info.name] = argument.name
     return ", ".join(options.get(name, name) for name in names.split(", "))
 
 
 def _tell(message: str, status: int) -> int:
+    """Print a message, and return the status."""
     print(f"walkers: {message}", file=sys.stderr)
     return status
 

@@ -241,10 +241,11 @@ def _curve(
     table = sources.table(sweep)
     table = table[table["status"] == "finished"].sort_values("frequency")
     rows = []
-    for value, velocities in _velocities_by_model(table, column).groupby(column):
+    for _, velocities in _velocities_by_model(table, column).groupby(column):
+        value = float(velocities[column].iloc[0])
         row = {name: float(velocities[name].mean()) * 1e3 for name in _MODELS}
         row["by_frequency"] = _ratio_of_ends(velocities["engine"])
-        name = f"Fig. {sweep.removeprefix('fig')}, {label(float(value))}"
+        name = f"Fig. {sweep.removeprefix('fig')}, {label(value)}"
         rows.append({"of": name, **json_numbers(row)})
     return rows
 

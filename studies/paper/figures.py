@@ -26,7 +26,7 @@ from walkers.postprocess.show.drawing import (
 )
 from walkers.postprocess.show.necks import bridges_at
 from walkers.postprocess.show.scene import Scene
-from walkers.postprocess.show.window import Window
+from walkers.postprocess.show.window import Picture, Window
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.record import read_sweep_record
@@ -162,7 +162,7 @@ def _strip(trajectory: Group, frames: IntArray) -> _Strip:
     return _Strip(centres, (left, right), half_width=1.15 * largest, height=2.0 * largest)
 
 
-def _picture(scene: Scene, size: list[int], frame: int, bridges: IntArray) -> FloatArray:
+def _picture(scene: Scene, size: list[int], frame: int, bridges: IntArray) -> Picture:
     """A picture of a frame, ``size`` pixels wide and high."""
     with closing(Window(scene, size)) as window:
         return window.picture(frame, bridges)
