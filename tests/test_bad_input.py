@@ -502,6 +502,7 @@ COMMANDS: list[tuple[str, str]] = [
     ("report {run} --to a.txt", "expected the name of a .html or .htm file"),
     ("plot {run} --to out.png", "out.png: expected a folder"),
     ("export {run} --to vtk --licence MIT", "--licence: is for --to archive"),
+    ("export {sweep} --to archive --every 2", "--every: is for --to vtk, lammps"),
     ("export {run} --to vtk --every 0", "--every: 0: expected 1 or more"),
     *((f"export {{run}} --to archive {words}", told) for words, told in (
         ("-o run.tar", "-o: expected the name of a .zip file"),

@@ -73,8 +73,8 @@ def export(
         Decks are printed.
     """
     given = _given(options)
+    check_export(form, list(given))
     if form == "deck":
-        check_export(form, list(given))
         _export_deck(name, to, lookup)
     else:
         print(lookup.load(name).export(form, to, **given))
