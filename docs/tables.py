@@ -145,8 +145,11 @@ def cell_texts(folder: Path) -> Iterator[tuple[str, str]]:
         text = file.read_text("utf-8")
         if not text.startswith(("# walkers ", "# python ")):
             continue
-        table = [line for line in text.splitlines() if line.startswith("| ")]
-        heads, _, *rows = [line.strip("| ").split(" | ") for line in table]
+        lines = []
+        for line in text.splitlines():
+            if line.startswith("| "):
+                lines.append(line.strip("| ").split(" | "))
+        heads, _, *rows = lines
         for row in rows:
             for head, cell in zip(heads, row, strict=True):
                 yield _name(file.stem, row[0], head), cell

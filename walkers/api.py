@@ -632,7 +632,7 @@ def _path(to: str | Path | None) -> Path | None:
 
 
 def run(
-    case: Case | str | Path,
+    case: Given,
     out: str | Path = DEFAULT_OUT,
     *,
     engine: str | None = None,
@@ -647,8 +647,8 @@ def run(
     Parameters
     ----------
     case
-        A resolved case, a case file, the name of a shipped case, a run, by its name or directory,
-        or the folder of a deck that was run by hand.
+        A case (resolved, tables, file or shipped name), a run, by its name or directory, or the
+        folder of a deck that was run by hand.
     out
         Folder of the run directories.
     engine
@@ -687,22 +687,22 @@ def run(
         finished = finished_at(named)
         if finished:
             return finished
-    case = named.case
-    out = named.folder
-    check_utf8(out.absolute())
-    check_utf8(case.name)
+    requested = named.case
+    folder = named.folder
+    check_utf8(folder.absolute())
+    check_utf8(requested.name)
     binary = find_engine(engine)
-    place = run_directory.run_place(case, binary, out)
+    place = run_directory.run_place(requested, binary, folder)
     if run_directory.is_finished(place) and not force:
-        return _measured(Run(place, requested=case))
+        return _measured(Run(place, requested=requested))
     check_audit(binary)
-    with progress_of(case.name, progress) as advance:
+    with progress_of(requested.name, progress) as advance:
         runs = make_runs(
-            [case], out, binary, force=force, on_progress=advance, time_limit=time_limit
+            [requested], folder, binary, force=force, on_progress=advance, time_limit=time_limit
         )
     if not runs:
         raise RunBusy("another process is still running this case", run_directory.unfinished(place))
-    return Run(place, cached=not runs[place.name], requested=case)
+    return Run(place, cached=not runs[place.name], requested=requested)
 
 
 def finished_at(named: Reference) -> Run | None:
