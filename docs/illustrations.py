@@ -402,8 +402,8 @@ def _benchmarks() -> Figure:
     return figure
 
 
-def _others() -> Illustration:
-    """A figure of the experiments of others."""
+def _repeated_experiments() -> Illustration:
+    """A figure of the experiments of others, repeated with the engine."""
     file = "figures/others.png"
 
     def cases() -> list[Case]:
@@ -526,7 +526,7 @@ for _shown in _SWEEP_FIGURES:
 ILLUSTRATIONS["pile-climbs"] = _climbs()
 ILLUSTRATIONS["unexplained"] = _effects()
 ILLUSTRATIONS["validation"] = _validation()
-ILLUSTRATIONS["others"] = _others()
+ILLUSTRATIONS["others"] = _repeated_experiments()
 ILLUSTRATIONS["calibration"] = _calibration()
 
 

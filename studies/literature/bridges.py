@@ -124,10 +124,10 @@ def velocities(out: Path) -> Iterator[Line]:
     Line
         Velocities in mm/s.
     """
-    reference, *others = WALKED_BY
+    reference, *laws = WALKED_BY
     for name in WALKED:
         expected = _velocity(name, reference, out)
-        for law in others:
+        for law in laws:
             title = f"velocity of {name}: {reference}, {law}"
             yield Line(title, expected, _velocity(name, law, out), unit="mm/s")
 
