@@ -26,8 +26,12 @@ from walkers.inputs.resolving.loads import bridge_at_rest, delay_of_walkers
 from walkers.inputs.tables.materials import Roughness
 from walkers.physics import reynolds
 from walkers.physics.bridge import Surfaces
-from walkers.physics.capillary import BridgeLiquid, largest_normal, share_of_bead
-from walkers.physics.capillary import rupture_distance_of_lian
+from walkers.physics.capillary import (
+    BridgeLiquid,
+    largest_normal,
+    rupture_distance_of_lian,
+    share_of_bead,
+)
 from walkers.physics.laplace import force_curve, rupture_distance
 from walkers.physics.laws import LAWS, rabinovich, willett, young_laplace
 from walkers.physics.time_step import FRACTIONS

@@ -1,4 +1,6 @@
-"""Analysis of runs: tables, velocities, pictures, ParaView files. Reads run directories, never starts the engine."""
+"""Analysis of runs: tables, velocities, pictures, ParaView files. Reads run directories, never
+starts the engine.
+"""
 
 if __name__ != "walkers.postprocess":
     raise ImportError(

@@ -5,7 +5,8 @@ cases stand on them. The walkers may differ in radii and in how they start; in s
 restitution) and liquid, which become atom types; and in their loads: tilt of the boundary, axes and
 acceleration of the drive. Frequencies and phases of the drive are the same for all.
 
-How the beads of one walker or of one pile stand is decided in `walkers.inputs.resolving.standing.starting_groups`.
+How the beads of one walker or of one pile stand is decided in
+`walkers.inputs.resolving.standing.starting_groups`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The paper's model: a dimer in contact under friction linear in the sliding velocity.
 
-Symbols as in Khan et al., *Self-assembled granular walkers*: bead 1 is the large ones, sin δ = (R1 -
-R2)/(R1 + R2) and μ = (m1 - m2)/M. Contacts 1 and 2 are the beads on the substrate, 3 is bead on
+Symbols as in Khan et al., *Self-assembled granular walkers*: bead 1 is the large ones, sin δ = (R1
+- R2)/(R1 + R2) and μ = (m1 - m2)/M. Contacts 1 and 2 are the beads on the substrate, 3 is bead on
 bead; x points from bead 2 to bead 1. Forces are in units of 4πγR̄, in which the force of the drive
 is Γ0.
 """

@@ -248,8 +248,8 @@ class _Layout:
 def _series_figure(motion: Motion, frames: Sequence[int], *, follow: bool) -> Figure:
     """Pictures of frames with axes in mm; the view may ``follow`` the beads.
 
-    Views that follow the beads have axes of their own: they stand below each other if they are wide,
-    beside each other if they are high.
+    Views that follow the beads have axes of their own: they stand below each other if they are
+    wide, beside each other if they are high.
     """
     scene = _scene_of(motion, follow=follow)
     width, height = (scene.high - scene.low)[:2].tolist()  # mm
