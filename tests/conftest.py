@@ -1,4 +1,7 @@
-"""Shared by the tests: cases built from the walker of Fig. 2, run by the real engine, each once a session."""
+"""Shared by the tests: cases of the walker of Fig. 2, and their runs by the real engine.
+
+What takes long, such as the run of a case, is made once a session, and no test changes it.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +18,6 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
-from itertools import islice
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -40,8 +42,8 @@ from walkers.runner.run_directory import locked, run_place
 from walkers.runs.making import OpenRun, open_locked
 from walkers.sweeps.scheduler import SweepOptions, run_sweep
 
-# The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, no rolling friction, one walker that starts on the
-# axis in equilibrium.
+# The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, no rolling friction, one walker
+# that starts on the axis in equilibrium.
 REFERENCE: dict[str, Any] = {
     "beads": {"material": "ruby"},
     "dimers": {
@@ -68,26 +70,52 @@ REFERENCE: dict[str, Any] = {
     # Its speed is that of 60 cycles, 20 of them to settle, to nine digits.
     "run": {"cycles": 24, "settling_cycles": 8},
 }
-# Whoever starts the tests in the background of a shell has SIGINT ignored, and so would all that they start.
+# A shell that starts the tests in the background has SIGINT ignored, by them and all they start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
-# MPI processes that wait for each other give way to others meanwhile: on a busy machine they are ten times as fast so.
+# MPI processes that wait for each other then let other processes run. On a busy machine, this makes
+# them ten times as fast.
 os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112
 _LONGEST = (
-    *("test_a_sweep_through_slurm", "test_figures_and_comparison", "test_a_pile_is_drawn"),
-    *("[a pile, killed]", "test_the_installed_engine_passes", "test_a_dimer_on_the_axis_climbs"),
+    "through_slurm",
+    "test_figures_and_comparison",
+    "test_a_pile_is_drawn",
+    "[a pile, killed]",
+    "test_the_installed_engine_passes",
+    "test_a_dimer_on_the_axis_climbs",
 )
 """Parts of the names of tests that take more than a few seconds, the longest first."""
+FillOnce = Callable[[str, Callable[[Path], object]], Path]
+"""The type of the fixture `once`: the name of a folder, and what fills it; returns the folder."""
 T = TypeVar("T")
 PROGRAM = str(Path(sys.executable).with_name("walkers"))
 SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
-BRIEF = {"time_step": "2 us", "cycles": 3, "settling_cycles": 1, "samples_per_cycle": 2}
-TINY = {"time_step": "2 us", "cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5}
-LONG = {"time_step": "2 us", "cycles": 4000, "settling_cycles": 2, "samples_per_cycle": 1}
+BRIEF = {
+    "time_step": "2 us",
+    "cycles": 3,
+    "settling_cycles": 1,
+    "samples_per_cycle": 2,
+}
+TINY = {
+    "time_step": "2 us",
+    "cycles": 4,
+    "settling_cycles": 1,
+    "samples_per_cycle": 5,
+}
+LONG = {
+    "time_step": "2 us",
+    "cycles": 4000,
+    "settling_cycles": 2,
+    "samples_per_cycle": 1,
+}
+"""Tables `run`, from the shortest to one that no test waits for."""
 
 
 def document(**changes: Any) -> dict[str, Any]:
-    """The reference case with changes such as ``drive={"frequency": "60 Hz"}`` merged into its tables."""
+    """The reference case as the tables of a file.
+
+    Changes such as ``drive={"frequency": "60 Hz"}`` are merged into its tables.
+    """
     merged = copy.deepcopy(REFERENCE)
     for table, values in changes.items():
         if isinstance(values, dict):
@@ -98,38 +126,45 @@ def document(**changes: Any) -> dict[str, Any]:
 
 
 def make_case(**changes: Any) -> Case:
-    """`document`, resolved."""
+    """The reference case with the changes of `document`."""
     return build_case(document(**changes), name="test")
 
 
 def origins(case: Case) -> dict[str, Origin]:
     """The origins of a case's values, by key."""
-    return {one.key: one for one in case.origins}
+    return {origin.key: origin for origin in case.origins}
 
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let each worker begin with some of the longest tests, so that none of them begins when all others have ended.
+    """Let each worker begin with some of the longest tests, so that none of them comes last.
 
-    Workers get equal pieces of what was collected, in its order, and take from each other later.
+    Each worker gets an equal share of the tests in the order in which they were collected; workers
+    that are done take tests from others.
     """
-    long = [item for name in _LONGEST for item in items if name in item.name]
-    short = iter([item for item in items if item not in long])
-    workers, left = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")), len(items)
+    long_tests = []
+    for name in _LONGEST:
+        long_tests += [item for item in items if name in item.name]
+    short_tests = [item for item in items if item not in long_tests]
+    workers = int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1"))
     items.clear()
+    tests_left = len(long_tests) + len(short_tests)
     for worker in range(workers):
-        piece, share = left // (workers - worker), long[worker::workers]
-        items += [*share, *islice(short, max(piece - len(share), 0))]
-        left -= piece
-    items += short
+        share = tests_left // (workers - worker)
+        tests_left -= share
+        own_long_tests = long_tests[worker::workers]
+        fillers = max(share - len(own_long_tests), 0)
+        items += own_long_tests + short_tests[:fillers]
+        del short_tests[:fillers]
+    items += short_tests
 
 
 @contextmanager
 def open_run(case: Case, engine: Engine, out: Path) -> Iterator[OpenRun]:
-    """A run that is being made in a folder, to be made with other decks or to be left unfinished."""
+    """A run in progress in a folder, which a test makes with another deck or leaves unfinished."""
     out.mkdir(parents=True, exist_ok=True)
     place = run_place(case, engine, out)
-    with locked([place]) as ours, open_locked(case, engine, place, list(ours.values())) as run:
+    with locked([place]) as locks, open_locked(case, engine, place, list(locks.values())) as run:
         yield run
 
 
@@ -137,49 +172,54 @@ def open_run(case: Case, engine: Engine, out: Path) -> Iterator[OpenRun]:
 def session_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of all workers of the session."""
     folder = tmp_path_factory.getbasetemp()
-    return folder.parent if "PYTEST_XDIST_WORKER" in os.environ else folder
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        return folder.parent
+    return folder
 
 
 @pytest.fixture(scope="session")
-def once(session_folder: Path) -> Callable[[str, Callable[[Path], object]], Path]:
-    """Folders that are filled once a session, by the worker that asks first; the others wait for it."""
+def once(session_folder: Path) -> FillOnce:
+    """Folders that are filled once a session, by the worker that asks first; others wait for it."""
 
-    def filled(name: str, fill: Callable[[Path], object]) -> Path:
-        folder, mark = session_folder / name, session_folder / f"{name}.filled"
+    def filled_folder(name: str, fill: Callable[[Path], object]) -> Path:
+        folder = session_folder / name
+        mark = session_folder / f"{name}.filled"
         with (session_folder / f"{name}.filling").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             if not mark.exists():
-                shutil.rmtree(folder, ignore_errors=True)  # somebody failed to fill it
+                shutil.rmtree(folder, ignore_errors=True)  # an earlier attempt failed
                 folder.mkdir()
                 fill(folder)
                 mark.touch()
         return folder
 
-    return filled
+    return filled_folder
 
 
 @pytest.fixture(scope="session", autouse=True)
-def cache(once: Callable[[str, Callable[[Path], object]], Path]) -> None:
-    """A cache of the session's own, for audits of the engine are kept in that of the user.
+def cache(once: FillOnce) -> None:
+    """A cache of the session's own: the audits of the engine stay apart from those of the user.
 
-    It has of it what is named by all that it depends on: solutions of equations, a tenth of a second each, and the
-    compiled contact model, four seconds.
+    What takes long to make, and has a name that follows from all that it depends on, comes from the
+    cache of the user: solutions of equations, a tenth of a second each, and the compiled contact
+    model, four seconds.
     """
 
-    def fill_it(folder: Path) -> None:
-        kept = make_cache_folder()
-        (own := folder / kept.name).mkdir()
+    def fill_cache(folder: Path) -> None:
+        cache_of_user = make_cache_folder()
+        own_cache = folder / cache_of_user.name
+        own_cache.mkdir()
         for name in ("young-laplace", "menisci"):
-            (own / name).symlink_to(make_cache_folder(name))
-        for model in kept.glob("bridge-*"):  # a copy: a link to it is not loaded
-            shutil.copy(model, own)
+            (own_cache / name).symlink_to(make_cache_folder(name))
+        for model in cache_of_user.glob("bridge-*"):
+            shutil.copy(model, own_cache)  # the program does not load a model through a link
 
-    os.environ["XDG_CACHE_HOME"] = str(once("cache", fill_it))
+    os.environ["XDG_CACHE_HOME"] = str(once("cache", fill_cache))
 
 
 @pytest.fixture(scope="session")
 def runs_folder(session_folder: Path) -> Path:
-    """Where the session's runs are kept, so that no case is run twice."""
+    """The folder with the runs of the session, in which no case is run twice."""
     folder = session_folder / "runs"
     folder.mkdir(exist_ok=True)
     return folder
@@ -187,14 +227,14 @@ def runs_folder(session_folder: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def run_directory(runs_folder: Path) -> Callable[..., Path]:
-    """Run the changed reference case (or a given one) and return its run directory."""
+    """Run a case, or else the changed reference case, and return its run directory."""
 
     def run(case: Case | None = None, **changes: Any) -> Path:
-        wanted = case or make_case(**changes)
+        wanted_case = case or make_case(**changes)
 
         def directory() -> Path | None:
-            with suppress(RunBusy):  # another worker is just making it
-                return run_case(wanted, runs_folder).directory
+            with suppress(RunBusy):  # another worker is making it
+                return run_case(wanted_case, runs_folder).directory
             return None
 
         return wait_for(directory)
@@ -204,93 +244,97 @@ def run_directory(runs_folder: Path) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def trajectory(run_directory: Callable[..., Path]) -> Callable[..., Group]:
-    """Run and read the trajectory."""
+    """Run a case, or else the changed reference case, and read the motion of its walkers."""
 
-    return lambda case=None, **changes: read_motion(run_directory(case, **changes)).groups[0]
+    def walkers_of(case: Case | None = None, **changes: Any) -> Group:
+        return read_motion(run_directory(case, **changes)).groups[0]
+
+    return walkers_of
 
 
-_FREQUENCIES, _PEAKS = (
-    {"drive.frequency": ["60 Hz", "80 Hz"]},
-    {"drive.peak_acceleration": ["2 g", "4 g", "6 g"]},
-)
-_FRICTIONS = {
-    f"contact.friction.bead_{other}": {"uniform": [0.05, 0.3]} for other in ("wall", "bead")
-}
+_FREQUENCIES = {"drive.frequency": ["60 Hz", "80 Hz"]}
+_PEAKS = {"drive.peak_acceleration": ["2 g", "4 g", "6 g"]}
 LOOKED_THROUGH: dict[str, dict[str, Any]] = {
-    "grid": {"axes": {**_FREQUENCIES, **_PEAKS}},
+    "grid": {"axes": _FREQUENCIES | _PEAKS},
     "rough": {
         "set": {"contact.friction.bead_wall": 0.2},
-        "axes": {**_FREQUENCIES, "drive.peak_acceleration": ["4 g", "2 g"]},
+        "axes": _FREQUENCIES | {"drive.peak_acceleration": ["4 g", "2 g"]},
     },
-    "three": {"axes": {"contact.friction.bead_wall": [0.1, 0.2], **_FREQUENCIES, **_PEAKS}},
+    "three": {"axes": {"contact.friction.bead_wall": [0.1, 0.2]} | _FREQUENCIES | _PEAKS},
     "beads": {
         "axes": {
             "liquid.name": ["Si AK5", "Si AK10"],
             "dimers.radii": [["0.3 mm", "0.2 mm"], ["0.25 mm", "0.2 mm"], ["0.35 mm", "0.2 mm"]],
         }
     },
-    "sampled": {"sample": [{"points": 4, "ranges": _FRICTIONS}]},
+    "sampled": {
+        "sample": [
+            {
+                "points": 4,
+                "ranges": {
+                    "contact.friction.bead_wall": {"uniform": [0.05, 0.3]},
+                    "contact.friction.bead_bead": {"uniform": [0.05, 0.3]},
+                },
+            }
+        ]
+    },
 }
 """Sweeps that are plotted, listed and compared, of two walkers each for four cycles."""
 
 
 @pytest.fixture(scope="session")
-def looked_through(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
-    """A folder with the runs of `LOOKED_THROUGH`; who changes it takes a copy."""
-    changes = {"run": TINY, "dimers": {"replicates": 2, "angle_spread": "1 deg"}}
+def looked_through(once: FillOnce) -> Path:
+    """A folder with the runs of `LOOKED_THROUGH`; a test that changes it takes a copy."""
 
-    def fill(folder: Path) -> None:
-        (folder / "base.toml").write_text(to_toml(document(**changes)))
+    def run_sweeps(folder: Path) -> None:
+        case = document(run=TINY, dimers={"replicates": 2, "angle_spread": "1 deg"})
+        (folder / "base.toml").write_text(to_toml(case))
         for name, axes in LOOKED_THROUGH.items():
             sweep = expand({"case": "base.toml", **axes}, source=name, name=name, folder=folder)
             _, failures = run_sweep(sweep, folder / "runs", SweepOptions(2))
             assert not failures
 
-    return once("looked-through", fill) / "runs"
+    return once("looked-through", run_sweeps) / "runs"
 
 
 def brief_pile(**run: Any) -> Case:
     """A third of the shipped pile, settled and shaken for some hundredths of a second."""
     tables = read_toml(shipped("case")["pile-ci"])
-    tables["mixture"] |= {"count": 20}
-    brief = {
+    tables["mixture"]["count"] = 20
+    brief_run = {
         "duration": "0.03 s",
         "time_step": "3 us",
         "longest_settling": "0.02 s",
         "segment": "0.01 s",
     }
-    return build_case({**tables, "run": {**brief, **run}}, name="brief")
+    return build_case({**tables, "run": brief_run | run}, name="brief")
 
 
 HALF = {"duration": "0.1 s", "segment": "0.05 s"}
-"""Of the shipped pile: half as long as it ships, in as many segments."""
+"""Table `run` of the shipped pile: half as long as it ships, in as many segments."""
 
 
 @pytest.fixture(scope="session")
-def pile_run(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
+def pile_run(once: FillOnce) -> Path:
     """The shipped pile of 60 beads."""
 
-    def make(out: Path) -> None:
+    def run_pile(out: Path) -> None:
         tables = read_toml(shipped("case")["pile-ci"])
-        tables["run"] |= HALF
+        tables["run"].update(HALF)
         assert not run_case(build_case(tables, name="pile-ci"), out).cached
 
-    (directory,) = once("piles", make).glob("pile-ci-*")
+    (directory,) = once("piles", run_pile).glob("pile-ci-*")
     return directory
 
 
 @pytest.fixture(scope="session")
-def archive(
-    run_directory: Callable[..., Path], once: Callable[[str, Callable[[Path], object]], Path]
-) -> Path:
-    """The archive of a run, to be copied and damaged."""
-    return (
-        once(
-            "archived-run",
-            lambda folder: write_archive(run_directory(run=SHORT), folder / "run.zip"),
-        )
-        / "run.zip"
-    )
+def archive(run_directory: Callable[..., Path], once: FillOnce) -> Path:
+    """The archive of a run, of which tests damage copies."""
+
+    def write_it(folder: Path) -> None:
+        write_archive(run_directory(run=SHORT), folder / "run.zip")
+
+    return once("archived-run", write_it) / "run.zip"
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -308,108 +352,161 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     yield tmp_path
 
 
+def write_engine(path: Path, script: str) -> str:
+    """Write an engine that is a shell script, most often around the real one; return its path."""
+    path.write_text(f"#!/bin/sh\n{script}\n")
+    path.chmod(0o755)
+    return str(path)
+
+
 @pytest.fixture
 def front(tmp_path: Path) -> Callable[[str], str]:
-    """An engine that is a shell script, most often around the real one."""
+    """Write an engine that is a shell script into the temporary folder of the test."""
 
-    def made(script: str) -> str:
-        path = tmp_path / "front"
-        path.write_text(f"#!/bin/sh\n{script}\n")
-        path.chmod(0o755)
-        return str(path)
+    def write(script: str) -> str:
+        return write_engine(tmp_path / "front", script)
 
-    return made
+    return write
 
 
 def finished_places(out: Path) -> dict[str, Path]:
     """Directories of all finished runs of a folder, by name."""
-    places = (path.parent for path in sorted(out.glob("*/manifest.json")))
-    return {
-        place.name: place for place in places if place.suffix not in (".incomplete", ".replaced")
-    }
+    places = {}
+    for manifest in sorted(out.glob("*/manifest.json")):
+        place = manifest.parent
+        if place.suffix not in (".incomplete", ".replaced"):
+            places[place.name] = place
+    return places
 
 
 def bits(out: Path) -> dict[Path, bytes]:
     """What finished runs computed, by paths: dumps, restart files, tables, results."""
-    kinds = (".bin", ".parquet", ".restart", ".txt", "result.json")
-    files = (path for place in finished_places(out).values() for path in place.rglob("*"))
-    return {path.relative_to(out): path.read_bytes() for path in files if path.name.endswith(kinds)}
+    endings = (".bin", ".parquet", ".restart", ".txt", "result.json")
+    contents = {}
+    for place in finished_places(out).values():
+        for path in place.rglob("*"):
+            if path.name.endswith(endings):
+                contents[path.relative_to(out)] = path.read_bytes()
+    return contents
 
 
 def engines_in(directory: Path) -> list[int]:
     """Process ids of the engines that work in a directory or below."""
-    return processes_in(
-        directory, b"liggghts", b"\0-in\0"
-    )  # not ldd, which asks what the engine is linked to
+    # With "-in" they are not the ldd that asks what the engine is linked to.
+    return processes_in(directory, b"liggghts", b"\0-in\0")
 
 
 def processes_in(directory: Path, *words: bytes) -> list[int]:
-    """Process ids of those that work in a directory or below and whose command has some words in it."""
-    found = []
+    """Process ids of those in a directory, or below, whose command has all of some words in it."""
+    ids = []
     for process in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):  # gone by now, or none of ours
-            command, folder = (process / "cmdline").read_bytes(), (process / "cwd").resolve()
+        with suppress(OSError):  # it has ended, or belongs to somebody else
+            command = (process / "cmdline").read_bytes()
+            folder = (process / "cwd").resolve()
             if all(word in command for word in words) and folder.is_relative_to(directory):
-                found.append(int(process.name))
-    return found
+                ids.append(int(process.name))
+    return ids
 
 
 PATIENCE = 300.0
-"""How long is waited for what is to happen, in s: many times what it takes on a machine that is busy elsewhere."""
+"""Time limit of waiting in s: many times what anything takes, also on a busy machine."""
 
 
 def wait_for(condition: Callable[[], T | None], seconds: float = PATIENCE) -> T:
-    """What a condition gives as soon as that is anything."""
+    """Wait until a condition returns anything that is true, and return that."""
     end = time.monotonic() + seconds
-    while (began := time.monotonic()) < end:
-        if found := condition():
-            return found
-        # A look may take the processor from what is waited for.
-        time.sleep(min(max(0.02, 4.0 * (time.monotonic() - began)), 0.5))
-    raise AssertionError("waited in vain")
+    while True:
+        start = time.monotonic()
+        if start >= end:
+            raise AssertionError("waited in vain")
+        value = condition()
+        if value:
+            return value
+        # Looking takes at most a fifth of the processor from what is waited for.
+        looked_for = time.monotonic() - start
+        time.sleep(min(max(0.02, 4.0 * looked_for), 0.5))
+
+
+@contextmanager
+def _warnings_of_a_process() -> Iterator[None]:
+    """Show the warnings that a Python process of its own shows."""
+    with warnings.catch_warnings():
+        warnings.resetwarnings()
+        for kind in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
+            warnings.simplefilter("ignore", kind)
+        yield
+
+
+@contextmanager
+def _state_is_restored() -> Iterator[None]:
+    """Restore the arguments of the process and its signal handlers."""
+    arguments = sys.argv
+    handlers = {}
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        handlers[number] = signal.getsignal(number)
+    try:
+        yield
+    finally:
+        sys.argv = arguments
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+
+
+def _captured_stream() -> io.TextIOWrapper:
+    """A stream that keeps what is written to it."""
+    return io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True)
+
+
+def _text_of(stream: io.TextIOWrapper) -> str:
+    """What was written to a captured stream."""
+    return stream.buffer.getvalue().decode()  # type: ignore[attr-defined, no-any-return]
 
 
 def call(
     *arguments: str, check: bool = False, folder: Path | None = None, study: str | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """What the program does with these arguments, without the half second that a process of its own takes.
+    """Call the program in this process, which saves the half second that a new one takes to start.
 
-    With a ``study``, such as ``studies.paper``, what ``python -m`` does with that module.
+    Where signals, pipes or the end of the interpreter matter, tests start `PROGRAM` instead.
 
-    Its warnings are those of a process of its own, and the handlers that it sets are taken back. Where signals, pipes
-    or the interpreter's end matter, tests start `PROGRAM`.
+    Parameters
+    ----------
+    arguments
+        The arguments of the program.
+    check
+        Whether its exit status must be zero.
+    folder
+        Its working directory; None: the present one.
+    study
+        A module such as ``studies.paper``, which is run as by ``python -m`` instead of the program.
+
+    Returns
+    -------
+    subprocess.CompletedProcess
+        Its exit status, and what it wrote to stdout and stderr.
     """
-    out, errors = (
-        io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2)
-    )
-    argv = sys.argv
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    output = _captured_stream()
+    errors = _captured_stream()
     with (
-        redirect_stdout(out),
+        redirect_stdout(output),
         redirect_stderr(errors),
         chdir(folder or "."),
-        warnings.catch_warnings(),
+        _warnings_of_a_process(),
+        _state_is_restored(),
     ):
-        warnings.resetwarnings()
-        for kind in (DeprecationWarning, PendingDeprecationWarning, ImportWarning, ResourceWarning):
-            warnings.simplefilter("ignore", kind)
         try:
             if study:
                 sys.argv = [study, *arguments]
-                warnings.filterwarnings(
-                    "ignore", ".*unpredictable", RuntimeWarning
-                )  # a test may have imported it
+                # `runpy` warns about a module that a test has imported.
+                warnings.filterwarnings("ignore", ".*unpredictable", RuntimeWarning)
                 runpy.run_module(study, run_name="__main__")
             else:
-                main([*arguments])
+                main(list(arguments))
         except SystemExit as end:
-            status = end.code
-        finally:
-            sys.argv = argv
-            for number, handler in handlers.items():
-                signal.signal(number, handler)
-    told = [stream.buffer.getvalue().decode() for stream in (out, errors)]  # type: ignore[attr-defined]
-    done = subprocess.CompletedProcess([PROGRAM, *arguments], int(status or 0), *told)
+            status = int(end.code or 0)
+    done = subprocess.CompletedProcess(
+        [PROGRAM, *arguments], status, _text_of(output), _text_of(errors)
+    )
     if check:
         assert done.returncode == 0, done.stderr
     return done
@@ -429,8 +526,9 @@ def mounted(place: Path, size: str) -> Iterator[Path]:
 
 
 def fill(place: Path) -> Path:
-    """Leave no byte on a file system; the file that takes them."""
-    with suppress(OSError), (place / "ballast").open("ab", buffering=0) as file:
+    """Fill a file system with a file, until no byte is left, and return the file."""
+    ballast = place / "ballast"
+    with suppress(OSError), ballast.open("ab", buffering=0) as file:
         while file.write(b"\0" * 4096):
             pass
-    return place / "ballast"
+    return ballast
