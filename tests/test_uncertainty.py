@@ -1,11 +1,13 @@
-"""What a velocity is uncertain by: guesses, scatter of copies, numerical errors; and what is printed."""
+"""Uncertain values and numerical errors of velocities, and slopes, on which headings differ."""
 
 from __future__ import annotations
 
+import copy
 import json
 import re
 import shutil
-from itertools import pairwise
+from collections.abc import Callable
+from dataclasses import dataclass
 from math import hypot
 from pathlib import Path
 from typing import Any
@@ -16,52 +18,99 @@ import pandas as pd
 import pytest
 
 import walkers
-from tests.conftest import call, make_case
+from tests.conftest import FillOnce, call, make_case
+from walkers.arrays import FloatArray
 from walkers.commands.catalogue import catalogue
-from walkers.files import write_json
+from walkers.files import read_json, write_json
 from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.reading import load_case
-from walkers.inputs.resolving import library
+from walkers.inputs.resolving.library import LibraryNumber, unmeasured
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import parse_quantity
 from walkers.postprocess.measure.motion import read_motion
 from walkers.postprocess.measure.numbers import headline, not_all_upright, rows
 from walkers.postprocess.measure.quantities import declared, ordered
-from walkers.postprocess.measure.results import NotComputed, headlines, not_computed, text
+from walkers.postprocess.measure.results import (
+    NotComputed,
+    Results,
+    headlines,
+    not_computed,
+    text,
+)
 from walkers.postprocess.measure.tables import read_columns
-from walkers.postprocess.measure.uncertainty import SPREAD_NAME, spread_of
+from walkers.postprocess.measure.uncertainty import ACCURACY_NAME, SPREAD_NAME, spread_of
 from walkers.postprocess.measure.walking import _velocities
 from walkers.rounding import rounded
 from walkers.runs.case_text import quantity_kind
-from walkers.sweeps.accuracy import measure_accuracy, modulus_factors
+from walkers.sweeps.accuracy import SHARE, measure_accuracy, modulus_factors
 from walkers.sweeps.listing import inventory, listing_text
 from walkers.sweeps.scheduler import SweepOptions
 from walkers.sweeps.table import default_column
 from walkers.theory.prediction import predict
 from walkers.theory.prediction_text import prediction_text
 
+DOCS = Path(__file__).parents[1] / "docs"
 
-def test_what_is_usual_lies_within_its_range() -> None:
-    """Strictly, but for a contact angle of 0°, the end of what is possible."""
-    numbers = {key: (one, one.range) for key, one in library.unmeasured().items()}
+
+def names_of_rows(result: Results) -> list[str]:
+    """Names of the numbers of a result that are printed."""
+    return [row.name for row in rows(result)]
+
+
+def printed_error(result: Results, name: str) -> str:
+    """What is printed behind a number of a result: its scatter, band or numerical error."""
+    errors = {row.name: row.error for row in rows(result)}
+    return errors[name]
+
+
+def with_values(result: Results, **values: Any) -> Results:
+    """A copy of a result with other numbers."""
+    changed = copy.copy(result)
+    changed.update(values)
+    return changed
+
+
+# --- ranges of the library --------------------------------------------------------------------
+
+
+def numbers_with_ranges() -> dict[str, tuple[str, LibraryNumber]]:
+    """The numbers of the library that have a range, with the key that takes them, by name."""
+    numbers = {}
+    for key, number in unmeasured().items():
+        numbers[key] = (key, number)
     for entry in catalogue():
-        if entry.kind == "surface pairs":
-            known = {key: one for key, one in entry.numbers.items() if one.range}
-            numbers |= {
-                f"contact.{key} of {entry.name}": (one, one.range) for key, one in known.items()
-            }
-    assert len(numbers) > 10
-    for key, (known, ends) in numbers.items():
-        assert known is not None
-        assert ends is not None
-        kind = quantity_kind(
-            key.partition(" of ")[0].replace("contact.meniscus", "liquid.meniscus")
-        )
-        value, low, high = (
-            parse_quantity(one, kind) if kind else one for one in (known.written, *ends)
-        )
-        assert low < value < high or (key == "liquid.contact_angle" and value == low == 0.0), key
+        if entry.kind != "surface pairs":
+            continue
+        for key, number in entry.numbers.items():
+            if number.range:
+                # A meniscus belongs to a pair of surfaces, but a case has it in its liquid.
+                table = "liquid" if key.startswith("meniscus") else "contact"
+                numbers[f"{key} of {entry.name}"] = (f"{table}.{key}", number)
+    return numbers
 
+
+@pytest.mark.parametrize(
+    ("key", "number"), numbers_with_ranges().values(), ids=numbers_with_ranges()
+)
+def test_the_default_of_the_library_lies_within_its_range(key: str, number: LibraryNumber) -> None:
+    """Strictly, except for a contact angle of 0°, which cannot be smaller."""
+    written = [number.written, *number.range]
+    kind = quantity_kind(key)
+    if kind:
+        written = [parse_quantity(value, kind) for value in written]
+    default, low, high = written
+    assert default < high
+    if key == "liquid.contact_angle":
+        assert default == low == 0.0
+    else:
+        assert low < default
+
+
+def test_many_numbers_of_the_library_have_ranges() -> None:
+    assert len(numbers_with_ranges()) > 10
+
+
+# --- walkers on a slope -----------------------------------------------------------------------
 
 SLOPE: dict[str, Any] = {
     "dimers": {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2},
@@ -79,69 +128,103 @@ SLOPE: dict[str, Any] = {
 
 
 @pytest.fixture(scope="module")
-def steep(tmp_path_factory: pytest.TempPathFactory) -> walkers.Run:
-    """Two dimers on a slope of 20°, one that faces up and one that faces down; the only run of its folder."""
-    return walkers.run(build_case(SLOPE, name="steep"), tmp_path_factory.mktemp("steep"))
+def steep(once: FillOnce) -> walkers.Run:
+    """Two dimers on a slope of 20°, one faces up and one down; the only run of its folder."""
+
+    def run_case(folder: Path) -> None:
+        walkers.run(build_case(SLOPE, name="steep"), folder)
+
+    (directory,) = once("steep", run_case).glob("steep-*")
+    return walkers.load(directory)
 
 
 def test_walkers_that_face_up_and_down_a_slope_differ(steep: walkers.Run) -> None:
-    """Each of both has one velocity, and the mean over both is no walker's."""
-    result = steep.result
-    up, down = steep.walkers.sort_values("facing", ascending=False)["velocity"]
-    assert (result["right_facing"], result["left_facing"]) == (up, down)
-    assert up < down
-    assert result["facings_differ"]
-    assert np.isnan([result["right_scatter"], result["left_scatter"]]).all()
+    """The one that faces up is slower; the result has the velocity of each."""
+    velocity = steep.walkers.set_index("facing")["velocity"]
+    assert steep.result["right_facing"] == velocity[1]
+    assert steep.result["left_facing"] == velocity[-1]
+    assert velocity[1] < velocity[-1]
+    assert steep.result["facings_differ"]
 
 
-def test_a_slope_is_in_the_headline_of_a_run_and_of_its_report(
-    steep: walkers.Run, tmp_path: Path
-) -> None:
+def test_one_walker_a_heading_has_no_scatter(steep: walkers.Run) -> None:
+    assert np.isnan(steep.result["right_scatter"])
+    assert np.isnan(steep.result["left_scatter"])
+
+
+def test_a_slope_is_in_the_headline_of_a_run(steep: walkers.Run) -> None:
     assert "plane tilted by 20°, right is up" in steep.describe()
-    assert "plane tilted by 20°" in steep.report(tmp_path / "report.html").read_text("utf-8")
+
+
+def test_a_slope_is_in_the_report_of_a_run(steep: walkers.Run, tmp_path: Path) -> None:
+    report = steep.report(tmp_path / "report.html").read_text("utf-8")
+    assert "plane tilted by 20°" in report
 
 
 def test_the_theory_is_beside_the_engines_walkers_that_face_up(steep: walkers.Run) -> None:
-    lines = prediction_text(predict(steep.case), steep.result).splitlines()
-    (engine,) = [line.split() for line in lines if line.startswith("engine")]
-    assert engine[:3] == ["engine,", "facing", "up"]
-    assert float(engine[3]) == pytest.approx(1e3 * steep.result["right_facing"], abs=1e-3)
+    table = prediction_text(predict(steep.case), steep.result)
+    (line,) = re.findall("^engine.*", table, re.MULTILINE)
+    words = line.split()
+    assert words[:3] == ["engine,", "facing", "up"]
+    assert float(words[3]) == pytest.approx(1e3 * steep.result["right_facing"], abs=1e-3)
 
 
 def test_the_printed_result_of_a_slope_has_the_velocities_of_both_ways(steep: walkers.Run) -> None:
-    shown = {row.name: row.text for row in rows(steep.result)}
-    assert "velocity" not in shown
+    """The mean over both would be no walker's velocity."""
+    printed = {row.name: row.text for row in rows(steep.result)}
+    assert "velocity" not in printed
     for name in ("axial_velocity", "axial_left_facing"):
-        assert float(shown[name]) == float(rounded(1e3 * steep.result[name], "mm/s"))
+        assert float(printed[name]) == float(rounded(1e3 * steep.result[name], "mm/s"))
 
 
 def test_the_inventory_has_the_velocities_of_both_ways(steep: walkers.Run) -> None:
-    up, down = (
-        rounded(1e3 * steep.result[name], "mm/s") for name in ("right_facing", "left_facing")
-    )
-    assert f" {up} mm/s facing up, {down} facing down " in listing_text(
-        inventory(steep.directory.parent)
-    )
+    up = rounded(1e3 * steep.result["right_facing"], "mm/s")
+    down = rounded(1e3 * steep.result["left_facing"], "mm/s")
+    listing = listing_text(inventory(steep.directory.parent))
+    assert f" {up} mm/s facing up, {down} facing down " in listing
 
 
-@pytest.mark.parametrize(("name", "shown"), [("right_facing", True), ("velocity", False)])
-def test_on_a_slope_the_band_of_a_spread_is_that_of_one_way(
-    steep: walkers.Run, name: str, shown: bool
+@pytest.fixture
+def banded(steep: walkers.Run, tmp_path: Path) -> Callable[[str], walkers.Run]:
+    """Give a copy of the run on a slope a spread of 64 draws for one of its numbers.
+
+    Its band, in m/s, ends just below the velocity of the walker that faces up.
+    """
+
+    def with_band(name: str) -> walkers.Run:
+        directory = tmp_path / steep.directory.name
+        shutil.copytree(steep.directory, directory)
+        velocity = steep.result["right_facing"]
+        band = {"low": velocity - 1e-3, "high": velocity - 1e-4, "points": 64}
+        spread = spread_of(directory.resolve())
+        spread.mkdir()
+        contents = {"varied": steep.result.about["rests_on"], "bands": {name: band}}
+        write_json(spread / SPREAD_NAME, contents)
+        return walkers.load(directory)
+
+    return with_band
+
+
+@pytest.mark.parametrize("name", ["right_facing", "velocity"])
+def test_the_band_of_a_spread_is_widened_to_the_result(
+    name: str, banded: Callable[[str], walkers.Run]
 ) -> None:
-    """It is widened to the result of the case itself; that of the mean over both ways is not printed."""
-    own = steep.result["right_facing"]
-    spread = spread_of(steep.directory.resolve())
-    spread.mkdir()
-    try:
-        band = {"low": own - 1e-3, "high": own - 1e-4, "points": 64}
-        write_json(
-            spread / SPREAD_NAME, {"varied": steep.result.about["rests_on"], "bands": {name: band}}
-        )
-        assert (steep.result[f"{name}_low"], steep.result[f"{name}_high"]) == (own - 1e-3, own)
-        errors = {row.name: row.error for row in rows(steep.result)}
-        assert errors["right_facing"].endswith("(64 draws)") == shown
-    finally:
-        shutil.rmtree(spread)
+    """On a slope, `velocity` is the velocity of walkers that face up."""
+    result = banded(name).result
+    assert result[f"{name}_low"] == result["right_facing"] - 1e-3
+    assert result[f"{name}_high"] == result["right_facing"]
+
+
+def test_on_a_slope_the_band_of_the_walkers_that_face_up_is_printed(
+    banded: Callable[[str], walkers.Run],
+) -> None:
+    assert printed_error(banded("right_facing").result, "right_facing").endswith("(64 draws)")
+
+
+def test_on_a_slope_the_band_of_the_mean_over_both_ways_is_not_printed(
+    banded: Callable[[str], walkers.Run],
+) -> None:
+    assert not printed_error(banded("velocity").result, "right_facing").endswith("(64 draws)")
 
 
 def test_slopes_are_compared_by_the_walkers_that_face_up(
@@ -149,302 +232,545 @@ def test_slopes_are_compared_by_the_walkers_that_face_up(
 ) -> None:
     tables = {**SLOPE, "boundary": {"material": "glass", "tilt": "10 deg"}}
     gentle = walkers.run(build_case(tables, name="gentle"), tmp_path)
-    text = walkers.compare(steep.directory, gentle.directory).text
-    assert "\nright_facing (mm/s)" in text
-    assert "\nvelocity (mm/s)" not in text
+    comparison = walkers.compare(steep.directory, gentle.directory).text
+    assert "\nright_facing (mm/s)" in comparison
+    assert "\nvelocity (mm/s)" not in comparison
 
 
-def test_the_main_number_of_points_depends_on_what_their_walkers_do(steep: walkers.Run) -> None:
-    """Of walkers that turned over it is the velocity up the slope, at one point of a sweep for all."""
+TURNED_OVER = {"turned_round": 1, "upright": 1, "turned_over": 1}
+"""Numbers of two walkers, of which one turned over."""
+
+
+def test_the_main_number_on_a_slope_is_the_velocity_of_walkers_that_face_up(
+    steep: walkers.Run,
+) -> None:
     result = dict(steep.result)
-    level = {**result, "facings_differ": False}
-    turned = {**result, "turned_round": 1, "upright": 1, "turned_over": 1}
-    for points, column in (
-        ([result], "right_facing"),
-        ([level], "velocity"),
-        ([result, turned], "axial_velocity"),
-    ):
-        assert default_column(pd.DataFrame(points)) == column
-        assert headline(points[-1]) == column
+    assert headline(result) == "right_facing"
+    assert default_column(pd.DataFrame([result])) == "right_facing"
+
+
+def test_the_main_number_is_the_velocity_if_headings_do_not_differ(steep: walkers.Run) -> None:
+    result = {**steep.result, "facings_differ": False}
+    assert headline(result) == "velocity"
+    assert default_column(pd.DataFrame([result])) == "velocity"
+
+
+def test_the_main_number_is_the_velocity_up_the_slope_if_walkers_turn_over_at_any_point(
+    steep: walkers.Run,
+) -> None:
+    """A sweep has one main column; a velocity along a heading means nothing for such walkers."""
+    result = dict(steep.result)
+    turned = {**steep.result, **TURNED_OVER}
+    assert headline(turned) == "axial_velocity"
+    assert default_column(pd.DataFrame([result, turned])) == "axial_velocity"
 
 
 def test_a_pile_that_climbs_has_not_fallen() -> None:
+    """A pile has no numbers of walkers that are upright."""
     assert not not_all_upright({"goes_uphill": True, "climbs": 0})
 
 
-def test_the_final_angle_is_printed_unless_some_walkers_turned_over(steep: walkers.Run) -> None:
-    """A mean over those that did and those that did not is no walker's; of one walker there is no range."""
-    result = dict(steep.result)
-    turned = {**result, "turned_round": 1, "upright": 1, "turned_over": 1}
-    assert "orientation_end" in {row.name for row in rows(result)}
-    assert "orientation_end" not in {row.name for row in rows(turned)}
-    low, high = (rounded(np.degrees(end), "°") for end in sorted(steep.walkers["orientation_end"]))
-    for number, expected in ((2, f"walkers {low} to {high}"), (1, "")):
-        errors = {row.name: row.error for row in rows({**result, "walkers": number})}
-        assert errors["orientation_end"] == expected
+def test_the_final_angle_is_printed(steep: walkers.Run) -> None:
+    assert "orientation_end" in names_of_rows(steep.result)
 
 
-def test_clusters_on_a_slope_are_averaged_by_the_way_they_face_and_lean_by_how_far_they_turned(
-    tmp_path: Path,
-) -> None:
-    """Not by the angle between the way that they face and their beads in front, which the arrangement contains."""
-    steep = {**FOUR_BEADS, "boundary": {"material": "glass", "tilt": "30 deg"}}
-    done = walkers.run(build_case(steep, name="four"), tmp_path)
-    result, each = done.result, done.walkers
-    up, down = (each[each["facing"] == way] for way in (1, -1))
-    assert (result["climbing"], result["descending"]) == (1, 1)
-    assert int((each["axial_velocity"] > 2e-6).sum()) == 1
-    assert result["velocity"] == pytest.approx(up["velocity"].mean())
-    assert result["axial_velocity"] == pytest.approx(up["axial_velocity"].mean())
-    assert result["axial_left_facing"] == pytest.approx(down["axial_velocity"].mean())
-    np.testing.assert_allclose(
-        done.trajectory.groupby("walker")["orientation"].first(), each["start_angle"], atol=2e-3
-    )
-    heading = read_motion(done.directory).groups[0].heading[[0, -1]]
-    turned = np.abs(
-        np.diff(np.unwrap(np.arctan2(heading[..., 1], heading[..., 0]), axis=0), axis=0)
-    )
-    assert result["ends_within"] == pytest.approx(turned.max(), abs=np.radians(2.0))
+def test_no_final_angle_is_printed_if_some_walkers_turned_over(steep: walkers.Run) -> None:
+    """A mean over those that turned over and those that did not is no walker's angle."""
+    turned = with_values(steep.result, **TURNED_OVER)
+    assert "orientation_end" not in names_of_rows(turned)
 
 
-FOUR_BEADS = {
+def test_the_final_angle_of_two_walkers_has_their_range(steep: walkers.Run) -> None:
+    low, high = np.degrees(sorted(steep.walkers["orientation_end"]))
+    error = printed_error(with_values(steep.result, walkers=2), "orientation_end")
+    assert error == f"walkers {rounded(low, '°')} to {rounded(high, '°')}"
+
+
+def test_the_final_angle_of_one_walker_has_no_range(steep: walkers.Run) -> None:
+    assert printed_error(with_values(steep.result, walkers=1), "orientation_end") == ""
+
+
+FOUR_BEADS: dict[str, Any] = {
     "clusters": [
         {
             "radii": ["0.5 mm", "0.3 mm", "0.3 mm", "0.3 mm"],
             "at": [
-                *(["0 mm", "0 mm"], ["-0.67075 mm", "0.38726 mm"]),
-                *(["-0.7461 mm", "-0.20777 mm"], ["-0.37418 mm", "-0.6782 mm"]),
+                ["0 mm", "0 mm"],
+                ["-0.67075 mm", "0.38726 mm"],
+                ["-0.7461 mm", "-0.20777 mm"],
+                ["-0.37418 mm", "-0.6782 mm"],
             ],
             "replicates": 2,
         }
     ],
     "beads": {"material": "glass"},
+    "boundary": {"material": "glass", "tilt": "30 deg"},
     "liquid": {"name": "glycerol 87 %", "volume_fraction": 0.01},
     "contact": {"friction": {"bead_bead": 0.3, "bead_wall": 0.3}, "rolling_friction": 0.005},
     "drive": {"frequency": "170 Hz", "peak_acceleration": "10 g"},
     "run": {"cycles": 24, "settling_cycles": 8},
 }
-"""A cluster whose beads in front are 13° beside the way that it faces."""
+"""Two clusters on a slope. Their front beads are 13° beside the direction that they face."""
 
 
-def test_walkers_that_came_apart_have_no_velocity_and_are_not_steady_anywhere_in_the_text(
-    runs_folder: Path,
-) -> None:
-    done = walkers.run(load_case("fig1b"), runs_folder)
-    columns = read_columns(done.directory, "walkers")
+@pytest.fixture(scope="module")
+def four_beads(once: FillOnce) -> walkers.Run:
+    """The two clusters of `FOUR_BEADS`, one faces up and one down."""
+
+    def run_case(folder: Path) -> None:
+        walkers.run(build_case(FOUR_BEADS, name="four"), folder)
+
+    (directory,) = once("four-beads", run_case).glob("four-*")
+    return walkers.load(directory)
+
+
+def test_of_two_clusters_on_a_slope_the_one_that_faces_up_climbs(four_beads: walkers.Run) -> None:
+    """A cluster climbs if it goes up faster than 2 µm/s."""
+    assert four_beads.result["climbing"] == 1
+    assert four_beads.result["descending"] == 1
+    assert (four_beads.walkers["axial_velocity"] > 2e-6).sum() == 1
+
+
+def test_clusters_on_a_slope_are_averaged_by_the_way_they_face(four_beads: walkers.Run) -> None:
+    result = four_beads.result
+    each = four_beads.walkers.set_index("facing")
+    assert result["velocity"] == pytest.approx(each["velocity"][1])
+    assert result["axial_velocity"] == pytest.approx(each["axial_velocity"][1])
+    assert result["axial_left_facing"] == pytest.approx(each["axial_velocity"][-1])
+
+
+def test_the_orientation_of_a_cluster_is_that_of_the_way_it_faces(four_beads: walkers.Run) -> None:
+    """It begins with the angle at which the cluster starts, not 13° (0.23 rad) beside it."""
+    first = four_beads.trajectory.groupby("walker")["orientation"].first()
+    np.testing.assert_allclose(first, four_beads.walkers["start_angle"], atol=2e-3)
+
+
+def test_a_cluster_leans_by_the_angle_that_it_turned(four_beads: walkers.Run) -> None:
+    """Not by the angle between its front beads and the direction that it faces."""
+    heading = read_motion(four_beads.directory).groups[0].heading
+    angle = np.unwrap(np.arctan2(heading[..., 1], heading[..., 0]), axis=0)
+    turned = np.abs(angle[-1] - angle[0])
+    assert four_beads.result["ends_within"] == pytest.approx(turned.max(), abs=np.radians(2.0))
+
+
+# --- what is printed about uncertainty --------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def fig1b(run_directory: Callable[..., Path]) -> walkers.Run:
+    """The walkers of Fig. 1b, without a spread and without measured accuracy."""
+    return walkers.load(run_directory(load_case("fig1b")))
+
+
+@pytest.fixture
+def came_apart(fig1b: walkers.Run) -> Results:
+    """The result of Fig. 1b if the beads of its walkers were apart for half of the time."""
+    columns = read_columns(fig1b.directory, "walkers")
     columns["separated_fraction"] = columns["separated_fraction"] + 0.5
-    apart = done.result
-    apart |= _velocities(columns, done.case)
-    assert apart["came_apart"]
-    assert headlines(apart)[0].endswith(": came apart")
-    assert "velocity" in [row.name for row in rows(done.result)]
-    assert not [row.name for row in rows(apart) if re.search("velocity|facing|steady", row.name)]
-    assert not_computed(done.result)
-    assert not not_computed(apart)
+    return with_values(fig1b.result, **_velocities(columns, fig1b.case))
 
 
-def test_what_is_not_computed_stands_right_below_the_head_of_a_result(runs_folder: Path) -> None:
-    """Six values of Fig. 1b have a range; no option has been used."""
-    done = walkers.run(load_case("fig1b"), runs_folder)
-    lines = done.describe().splitlines()
-    assert (
-        lines[1]
-        == "  uncertainty not computed: 6 uncertain values (--spread), numerical error (--accuracy)"
+def test_the_headline_says_that_walkers_came_apart(came_apart: Results) -> None:
+    assert came_apart["came_apart"]
+    assert headlines(came_apart)[0].endswith(": came apart")
+
+
+def test_walkers_that_came_apart_have_no_velocity_and_are_not_steady(
+    fig1b: walkers.Run, came_apart: Results
+) -> None:
+    assert "velocity" in names_of_rows(fig1b.result)
+    for name in names_of_rows(came_apart):
+        assert not re.search("velocity|facing|steady", name)
+
+
+def test_walkers_that_came_apart_have_no_uncertainty_to_be_computed(
+    fig1b: walkers.Run, came_apart: Results
+) -> None:
+    assert not_computed(fig1b.result)
+    assert not not_computed(came_apart)
+
+
+def test_what_is_not_computed_stands_right_below_the_head_of_a_result(fig1b: walkers.Run) -> None:
+    """Six values of Fig. 1b have a range, and neither option has been used."""
+    assert not_computed(fig1b.result) == NotComputed(uncertain_values=6, numerical_error=True)
+    _, second, *_ = fig1b.describe().splitlines()
+    assert second == (
+        "  uncertainty not computed: 6 uncertain values (--spread), numerical error (--accuracy)"
     )
-    assert not_computed(done.result) == NotComputed(uncertain_values=6, numerical_error=True)
 
 
-def test_scatter_of_copies_is_named_as_such(runs_folder: Path) -> None:
-    done = walkers.run(load_case("fig1b"), runs_folder)
-    (velocity,) = [row for row in rows(done.result) if row.name == "velocity"]
-    assert velocity.error == "scatter of copies below 0.001"
+def test_scatter_of_copies_is_named_as_such(fig1b: walkers.Run) -> None:
+    assert printed_error(fig1b.result, "velocity") == "scatter of copies below 0.001"
 
 
-def test_a_band_tells_that_it_leaves_out_the_error_of_the_model(runs_folder: Path) -> None:
-    done = walkers.run(load_case("fig1b"), runs_folder)
-    note = "of uncertain values only; the error of the model is not in it"
-    assert note not in done.describe()
-    result = done.result
-    result |= {
-        "velocity_low": 1e-3,
-        "velocity_high": 3e-3,
-        "velocity_draws": 32,
-        "velocity_approximate": False,
-    }
-    described = text(result)
-    assert note in described
-    assert "uncertain values (--spread)" not in described
+MODEL_NOTE = "of uncertain values only; the error of the model is not in it"
 
 
-def test_a_result_that_depends_on_the_start_says_so(runs_folder: Path) -> None:
-    """Of steady copies on a level floor those that face left are faster by 40 %, or those of one side differ."""
-    done = walkers.run(load_case("fig1b"), runs_folder)
-    assert not done.result["depends_on_start"]
-    columns = read_columns(done.directory, "walkers")
-    left = columns["facing"] < 0
-    for faster in (left, np.arange(len(left)) == 0):
-        changed = {**columns, "velocity": np.where(faster, 1.4, 1.0) * columns["velocity"]}
-        numbers = _velocities(changed, done.case)
-        assert numbers["depends_on_start"]
-        assert not _velocities({**changed, "steady": ~columns["steady"]}, done.case)[
-            "depends_on_start"
-        ]
+def test_a_result_without_a_band_has_no_note_about_bands(fig1b: walkers.Run) -> None:
+    assert MODEL_NOTE not in fig1b.describe()
 
 
-ROOT = Path(__file__).parent.parent
+def test_a_band_tells_that_it_leaves_out_the_error_of_the_model(fig1b: walkers.Run) -> None:
+    result = with_values(
+        fig1b.result,
+        velocity_low=1e-3,
+        velocity_high=3e-3,
+        velocity_draws=32,
+        velocity_approximate=False,
+    )
+    assert MODEL_NOTE in text(result)
+    assert "uncertain values (--spread)" not in text(result)
+
+
+def numbers_if_some_are_faster(
+    run: walkers.Run, is_faster: np.ndarray, *, steady: bool = True
+) -> dict[str, Any]:
+    """The numbers of walkers of which some are faster by 40 %."""
+    columns = read_columns(run.directory, "walkers")
+    columns["velocity"] = np.where(is_faster, 1.4, 1.0) * columns["velocity"]
+    if not steady:
+        columns["steady"] = np.zeros_like(columns["steady"])
+    return _velocities(columns, run.case)
+
+
+def test_a_result_of_equal_copies_does_not_depend_on_the_start(fig1b: walkers.Run) -> None:
+    assert not fig1b.result["depends_on_start"]
+
+
+def test_a_result_depends_on_the_start_if_one_heading_is_faster(fig1b: walkers.Run) -> None:
+    """On a level floor, where both should be equal."""
+    faces_left = read_columns(fig1b.directory, "walkers")["facing"] < 0
+    assert numbers_if_some_are_faster(fig1b, faces_left)["depends_on_start"]
+
+
+def test_a_result_depends_on_the_start_if_copies_of_one_heading_differ(fig1b: walkers.Run) -> None:
+    is_first = fig1b.walkers.index == 0
+    assert numbers_if_some_are_faster(fig1b, is_first)["depends_on_start"]
+
+
+def test_copies_that_are_not_steady_do_not_show_that_a_result_depends_on_the_start(
+    fig1b: walkers.Run,
+) -> None:
+    """They may still become equal."""
+    is_first = fig1b.walkers.index == 0
+    numbers = numbers_if_some_are_faster(fig1b, is_first, steady=False)
+    assert not numbers["depends_on_start"]
+
+
+def test_the_plan_of_a_sweep_has_the_runs_of_its_spread(in_folder: Path) -> None:
+    """Two points with two draws each."""
+    plan = call("sweep", "fig4", "--dry-run", "--spread", "--points", "2", check=True).stdout
+    assert "points     2: " in plan
+    assert "4 more runs, predicted " in plan
+    assert not Path("runs").exists()
+
+
+# --- numerical errors -------------------------------------------------------------------------
+
 QUICK = {"time_step": "4 us", "cycles": 6, "settling_cycles": 2, "samples_per_cycle": 5}
-PAIR = {"radii": ["0.3 mm", "0.2 mm"], "replicates": 2}
 
 
-def changed(case: Case, shorter: float, harder: float) -> Case:
-    """A case with a part of its time step and a multiple of its modulus."""
-    step, modulus = 1e6 * case.run.time_step * shorter, 1e-6 * case.contact.youngs_modulus * harder
+def with_step_and_modulus(case: Case, step_factor: float, modulus_factor: float) -> Case:
+    """A case with a part of its time step and a multiple of its Young's modulus."""
+    microseconds = 1e6 * case.run.time_step * step_factor
+    megapascals = 1e-6 * case.contact.youngs_modulus * modulus_factor
     return changed_case(
-        case, {"run.time_step": f"{step!r} us", "contact.youngs_modulus": f"{modulus!r} MPa"}
+        case,
+        {
+            "run.time_step": f"{microseconds!r} us",
+            "contact.youngs_modulus": f"{megapascals!r} MPa",
+        },
     )
+
+
+def harder(case: Case, factor: float) -> Case:
+    """A case with harder beads; the Rayleigh limit of the time step falls as their root."""
+    return with_step_and_modulus(case, factor**-0.5, factor)
+
+
+@dataclass(frozen=True)
+class MeasuredRun:
+    """A run whose numerical errors are measured."""
+
+    run: walkers.Run
+    accuracy: dict[str, Any]
+
+    @property
+    def folder(self) -> Path:
+        """The folder with the run and with those that measured its errors."""
+        return self.run.directory.parent
+
+
+def measured_once(once: FillOnce, name: str, case: Case) -> MeasuredRun:
+    """Run a case and measure its errors, once a session."""
+
+    def measure(folder: Path) -> None:
+        run = walkers.run(case, folder)
+        assert "velocity_error" not in run.result
+        run.accuracy()
+
+    run = walkers.run(case, once(name, measure))
+    assert run.cached
+    return MeasuredRun(run, read_json(run.directory / ACCURACY_NAME))
+
+
+def fig1b_at_90_hz() -> Case:
+    """The walker of Fig. 1b at a frequency and an acceleration where softness matters."""
+    return load_case("fig1b", {"drive.frequency": "90 Hz", "drive.peak_acceleration": "10 g"})
+
+
+@pytest.fixture(scope="module")
+def fast_walker(once: FillOnce) -> MeasuredRun:
+    """`fig1b_at_90_hz` with its measured errors."""
+    return measured_once(once, "fast-walker", fig1b_at_90_hz())
 
 
 @pytest.mark.slow
 def test_the_error_is_the_distance_from_far_harder_beads_at_a_far_smaller_step(
-    tmp_path: Path,
+    fast_walker: MeasuredRun, tmp_path: Path
 ) -> None:
-    """100 times as hard, at half the step that the modulus allows: within the share that was asked for."""
-    case = load_case("fig1b", {"drive.frequency": "90 Hz", "drive.peak_acceleration": "10 g"})
-    done, reference = (walkers.run(one, tmp_path) for one in (case, changed(case, 0.05, 100.0)))
-    own, limit = (run.result["velocity"] for run in (done, reference))
-    assert "velocity_error" not in done.result
-    found = done.accuracy()
-    error = found["errors"]["velocity"]
-    assert found["reached"]
-    assert abs(own + error["stiffer"] - limit) < found["share"] * limit
-    assert error["stiffer"] < -0.01 * own  # the limit is slower …
-    half = walkers.run(changed(case, 0.5, 1.0), tmp_path)
-    assert half.cached  # it is one of the runs
-    assert error["half_step"] == pytest.approx(half.result["velocity"] - own)
-    assert error["total"] == pytest.approx(hypot(error["half_step"], error["stiffer"]))
-    # … because the large bead slides more.
-    assert found["errors"]["sliding_1"]["stiffer"] < 2.0 * error["stiffer"]
-    assert done.result["velocity_error"] == done.result["numerical_error"] == error["total"]
-    speeds = walkers.load(tmp_path / found["sweep"]).table()["velocity"]
-    cells = " | ".join(f"{1e3 * one:.3f}" for one in (own, *speeds[1:]))
-    assert f"| `fig1b`, 10 g and 90 Hz | {cells} |" in (
-        ROOT / "docs/explanation/physics.md"
-    ).read_text("utf-8")
-    assert (
-        declared("rotation_2_error").label == "rotation of bead 2, numerical error"
-    )  # also in the table of a sweep
-    assert ordered(["sliding_1", "rotation_2_error", "velocity"]) == [
-        "velocity",
-        "rotation_2_error",
-        "sliding_1",
-    ]
-    (row,) = (row for row in rows(done.result) if row.name == "velocity")
-    assert f"numerical error {1e3 * error['total']:.2g}" in row.error
-    assert row.error in done.describe()
-    assert (
-        f"\n{done.directory.name} " in call("list", "--out", str(tmp_path), check=True).stdout
-    )  # beside the sweep
-    with ZipFile(done.export("archive", tmp_path / "run.zip")) as archive:
-        assert f"runs/{done.directory.name}/accuracy.json" in archive.namelist()
-    call("check", "files", str(done.directory), check=True)
+    """100 times as hard, at half of the step that this modulus allows: within the asked share."""
+    limit_case = with_step_and_modulus(fig1b_at_90_hz(), 0.05, 100.0)
+    limit = walkers.run(limit_case, tmp_path).result["velocity"]
+    velocity = fast_walker.run.result["velocity"]
+    change = fast_walker.accuracy["errors"]["velocity"]["stiffer"]
+    assert fast_walker.accuracy["reached"]
+    assert abs(velocity + change - limit) < SHARE * limit
 
 
-def test_an_interrupted_accuracy_continues_and_an_edited_one_can_be_measured_again(
-    tmp_path: Path,
+@pytest.mark.slow
+def test_harder_beads_walk_slower_because_the_large_one_slides_more(
+    fast_walker: MeasuredRun,
 ) -> None:
-    done = walkers.run(make_case(run=QUICK), tmp_path)
+    """By more than 1 %; the large bead slides backward by twice as much as the walker loses."""
+    errors = fast_walker.accuracy["errors"]
+    assert errors["velocity"]["stiffer"] < -0.01 * fast_walker.run.result["velocity"]
+    assert errors["sliding_1"]["stiffer"] < 2.0 * errors["velocity"]["stiffer"]
 
-    def stop(_: object) -> None:
-        if len([*tmp_path.glob("*/manifest.json")]) > 2:
+
+@pytest.mark.slow
+def test_the_error_of_the_time_step_is_the_change_at_half_of_it(fast_walker: MeasuredRun) -> None:
+    half_case = with_step_and_modulus(fig1b_at_90_hz(), 0.5, 1.0)
+    half = walkers.run(half_case, fast_walker.folder)
+    assert half.cached  # it is one of the runs that measured the errors
+    error = fast_walker.accuracy["errors"]["velocity"]
+    change = half.result["velocity"] - fast_walker.run.result["velocity"]
+    assert error["half_step"] == pytest.approx(change)
+
+
+@pytest.mark.slow
+def test_the_printed_result_has_the_numerical_error(fast_walker: MeasuredRun) -> None:
+    result = fast_walker.run.result
+    total = fast_walker.accuracy["errors"]["velocity"]["total"]
+    assert result["velocity_error"] == total
+    assert result["numerical_error"] == total
+    printed = printed_error(result, "velocity")
+    assert f"numerical error {1e3 * total:.2g}" in printed
+    assert printed in fast_walker.run.describe()
+
+
+@pytest.mark.slow
+def test_the_page_about_the_physics_has_the_velocities_of_harder_beads(
+    fast_walker: MeasuredRun,
+) -> None:
+    """Of the case itself and of its harder beads; the first point of the sweep is the half step."""
+    table = walkers.load(fast_walker.folder / fast_walker.accuracy["sweep"]).table()
+    velocities = [fast_walker.run.result["velocity"], *table["velocity"][1:]]
+    cells = " | ".join(f"{1e3 * velocity:.3f}" for velocity in velocities)
+    page = (DOCS / "explanation" / "physics.md").read_text("utf-8")
+    assert f"| `fig1b`, 10 g and 90 Hz | {cells} |" in page
+
+
+@pytest.mark.slow
+def test_a_run_is_listed_beside_the_sweep_of_its_accuracy(fast_walker: MeasuredRun) -> None:
+    listing = call("list", "--out", str(fast_walker.folder), check=True).stdout
+    assert f"\n{fast_walker.run.directory.name} " in listing
+
+
+@pytest.mark.slow
+def test_the_archive_of_a_run_has_its_accuracy(fast_walker: MeasuredRun, tmp_path: Path) -> None:
+    with ZipFile(fast_walker.run.export("archive", tmp_path / "run.zip")) as archive:
+        names = archive.namelist()
+    assert f"runs/{fast_walker.run.directory.name}/accuracy.json" in names
+
+
+@pytest.mark.slow
+def test_the_files_of_a_run_with_accuracy_are_sound(fast_walker: MeasuredRun) -> None:
+    call("check", "files", str(fast_walker.run.directory), check=True)
+
+
+def test_numerical_errors_have_labels_and_stand_beside_their_numbers() -> None:
+    assert declared("rotation_2_error").label == "rotation of bead 2, numerical error"
+    in_order = ordered(["sliding_1", "rotation_2_error", "velocity"])
+    assert in_order == ["velocity", "rotation_2_error", "sliding_1"]
+
+
+def test_an_interrupted_accuracy_continues(tmp_path: Path) -> None:
+    """It is interrupted when two of its runs are finished, which are not made again."""
+    run = walkers.run(make_case(run=QUICK), tmp_path)
+
+    def interrupt(_: object) -> None:
+        if len(list(tmp_path.glob("*/manifest.json"))) > 2:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        measure_accuracy(done.directory, SweepOptions(1), on_progress=stop)
-    assert "velocity_error" not in done.result
-    before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*/manifest.json")}
-    assert len(before) >= 2
-    kept = done.accuracy()
-    del before[done.directory / "manifest.json"]  # it lists the new file
-    assert before == {path: path.stat().st_mtime_ns for path in before}
-    (done.directory / "accuracy.json").write_text('{"errors": {}}')
-    told = call("run", str(done.directory))
-    assert (told.returncode, told.stderr.count("\n")) == (2, 1)
-    assert told.stderr.endswith(
-        f"damaged; measure it again with: walkers run {done.directory} --accuracy\n"
+        measure_accuracy(run.directory, SweepOptions(1), on_progress=interrupt)
+    assert "velocity_error" not in run.result
+    times = {}
+    for manifest in tmp_path.glob("*/manifest.json"):
+        if manifest.parent != run.directory:  # its own manifest lists the new accuracy.json
+            times[manifest] = manifest.stat().st_mtime_ns
+    assert times
+    run.accuracy()
+    assert "velocity_error" in run.result
+    for manifest, time in times.items():
+        assert manifest.stat().st_mtime_ns == time
+
+
+@pytest.fixture(scope="module")
+def slope_walkers(once: FillOnce) -> MeasuredRun:
+    """A walker that goes up a slope and one that goes down it, with their measured errors."""
+    case = make_case(
+        run=QUICK,
+        boundary={"material": "glass", "tilt": "20 deg"},
+        dimers={"radii": ["0.3 mm", "0.2 mm"], "replicates": 2},
     )
-    again = call("run", str(done.directory), "--accuracy", "--json", check=True)
-    assert (
-        json.loads(again.stdout.splitlines()[-1])["velocity_error"]
-        == kept["errors"]["velocity"]["total"]
+    return measured_once(once, "slope-walkers", case)
+
+
+def velocities_with_harder_beads(measured: MeasuredRun, factor: float) -> FloatArray:
+    """Velocities of both headings with harder beads, m/s."""
+    result = walkers.run(harder(measured.run.case, factor), measured.folder).result
+    return np.array([result["right_facing"], result["left_facing"]])
+
+
+def test_walkers_up_and_down_a_slope_both_converge(slope_walkers: MeasuredRun) -> None:
+    """The modulus increases fourfold until both headings change by less than 1 %."""
+    previous = velocities_with_harder_beads(slope_walkers, 4.0)
+    for factor in (16.0, 64.0):
+        velocities = velocities_with_harder_beads(slope_walkers, factor)
+        change = np.abs(velocities / previous - 1.0).max()
+        if change < 0.01:
+            break
+        previous = velocities
+    assert change < 0.01
+    assert slope_walkers.accuracy["times"] == factor
+    assert slope_walkers.accuracy["change"] == pytest.approx(change, rel=0.02)
+
+
+@pytest.fixture
+def damaged_accuracy(slope_walkers: MeasuredRun, tmp_path: Path) -> Path:
+    """A copy of the run on a slope, whose accuracy.json somebody edited."""
+    shutil.copytree(slope_walkers.folder, tmp_path / "runs")
+    directory = tmp_path / "runs" / slope_walkers.run.directory.name
+    (directory / ACCURACY_NAME).write_text('{"errors": {}}')
+    return directory
+
+
+def test_an_edited_accuracy_is_told_in_one_line(damaged_accuracy: Path) -> None:
+    process = call("run", str(damaged_accuracy))
+    assert process.returncode == 2
+    assert process.stderr.count("\n") == 1
+    assert process.stderr.endswith(
+        f"damaged; measure it again with: walkers run {damaged_accuracy} --accuracy\n"
     )
 
 
-def test_walkers_up_and_down_a_slope_both_converge(tmp_path: Path) -> None:
-    case = make_case(run=QUICK, boundary={"material": "glass", "tilt": "20 deg"}, dimers=PAIR)
-    done = walkers.run(case, tmp_path)
-    found = done.accuracy()
-    speeds = [
-        [run[f"{way}_facing"] for way in ("right", "left")]
-        for run in (
-            walkers.run(changed(case, times**-0.5, times), tmp_path).result
-            for times in (4.0, 16.0, 64.0)
-        )
-    ]
-    changes = [
-        max(abs(after / before - 1.0) for before, after in zip(*pair, strict=True))
-        for pair in pairwise(speeds)
-    ]
-    times, change = next(
-        (16.0 * 4.0**place, one) for place, one in enumerate(changes) if one < 0.01
-    )
-    assert found["times"] == times
-    assert found["change"] == pytest.approx(change, rel=0.02)
-
-
-@pytest.mark.parametrize(
-    ("modulus", "times"),
-    [
-        *((200.0, [1.0, 4.0, 16.0, 64.0, 256.0]), (800.0, [1.0, 4.0, 16.0, 64.0, 125.0])),
-        *((6250.0, [1.0, 4.0, 16.0]), (51200.0, [1.0, 1.953125]), (90000.0, [1.0])),
-    ],
-)
-def test_beads_are_compared_with_the_hardest_possible(
-    modulus: float, times: list[float], tmp_path: Path
+def test_an_edited_accuracy_can_be_measured_again(
+    damaged_accuracy: Path, slope_walkers: MeasuredRun
 ) -> None:
-    """Those of 90 GPa cannot be harder: their error is that of the time step alone, and the result says so."""
-    case = build_case(
+    """Its runs are finished, so the numbers are the same as before."""
+    process = call("run", str(damaged_accuracy), "--accuracy", "--json", check=True)
+    numbers = json.loads(process.stdout.splitlines()[-1])
+    errors = slope_walkers.accuracy["errors"]
+    assert numbers["right_facing_error"] == errors["right_facing"]["total"]
+    assert numbers["left_facing_error"] == errors["left_facing"]["total"]
+
+
+def make_steel_case(megapascals: float) -> Case:
+    """Two steel beads with a Young's modulus in contact; that of steel is at most 100 GPa here."""
+    return build_case(
         {
             "dimers": {"diameters": ["10 mm", "7 mm"], "replicates": 1},
             "beads": {"material": "chrome steel"},
             "liquid": {"name": "glycerol"},
             "boundary": {"material": "glass"},
-            "contact": {"youngs_modulus": f"{modulus} MPa"},
+            "contact": {"youngs_modulus": f"{megapascals} MPa"},
             "drive": {"frequency": "60 Hz", "peak_acceleration": "5 g"},
             "run": {"cycles": 4, "settling_cycles": 1, "samples_per_cycle": 5},
         },
         name="steel",
     )
-    assert modulus_factors(case) == times
-    if len(times) > 2:
-        return
-    done = walkers.run(case, tmp_path)
-    own, found = done.result["velocity"], done.accuracy()
-    error = found["errors"]["velocity"]
-    half, harder = (
-        walkers.run(changed(case, *how), tmp_path)
-        for how in ((0.5, 1.0), (times[-1] ** -0.5, times[-1]))
-    )
-    assert half.cached and harder.cached
-    assert (own + error["half_step"], own + error["stiffer"]) == pytest.approx(
-        (half.result["velocity"], harder.result["velocity"]), rel=1e-12
-    )
-    assert found["times"] == times[-1]
-    assert found["change"] == pytest.approx(abs(error["stiffer"]) / harder.result["velocity"])
-    assert ("warning: the beads cannot be harder" in done.describe()) == (times == [1.0])
 
 
-def test_the_plan_of_a_sweep_has_the_runs_of_its_spread(in_folder: Path) -> None:
-    plan = call("sweep", "fig4", "--dry-run", "--spread", "--points", "2", check=True).stdout
-    assert "points     2: " in plan
-    assert "4 more runs, predicted " in plan
-    assert not Path("runs").exists()
+@pytest.mark.parametrize(
+    ("megapascals", "factors"),
+    [
+        (200.0, [1.0, 4.0, 16.0, 64.0, 256.0]),
+        (800.0, [1.0, 4.0, 16.0, 64.0, 125.0]),  # 125 · 800 MPa = 100 GPa
+        (6250.0, [1.0, 4.0, 16.0]),
+        (51200.0, [1.0, 1.953125]),
+        (90000.0, [1.0]),  # 100 GPa is an increase by less than a quarter
+    ],
+)
+def test_beads_are_compared_with_the_hardest_possible(
+    megapascals: float, factors: list[float]
+) -> None:
+    """Factors of four, at most 256, and at last the one that leads to 100 GPa."""
+    assert modulus_factors(make_steel_case(megapascals)) == factors
+
+
+@pytest.fixture(scope="module")
+def steel(once: FillOnce) -> MeasuredRun:
+    """Beads of 51.2 GPa, which can be 1.95 times as hard."""
+    return measured_once(once, "steel", make_steel_case(51200.0))
+
+
+@pytest.fixture(scope="module")
+def hardest_steel(once: FillOnce) -> MeasuredRun:
+    """Beads of 90 GPa, which cannot be harder."""
+    return measured_once(once, "hardest-steel", make_steel_case(90000.0))
+
+
+def test_errors_are_changes_at_half_the_step_and_with_harder_beads(steel: MeasuredRun) -> None:
+    half = walkers.run(with_step_and_modulus(steel.run.case, 0.5, 1.0), steel.folder)
+    hard = walkers.run(harder(steel.run.case, 1.953125), steel.folder)
+    assert half.cached
+    assert hard.cached
+    velocity = steel.run.result["velocity"]
+    error = steel.accuracy["errors"]["velocity"]
+    assert velocity + error["half_step"] == pytest.approx(half.result["velocity"], rel=1e-12)
+    assert velocity + error["stiffer"] == pytest.approx(hard.result["velocity"], rel=1e-12)
+    change = abs(error["stiffer"]) / hard.result["velocity"]
+    assert steel.accuracy["change"] == pytest.approx(change)
+    assert steel.accuracy["times"] == 1.953125
+
+
+def test_the_total_error_is_the_root_of_the_sum_of_squares(steel: MeasuredRun) -> None:
+    error = steel.accuracy["errors"]["velocity"]
+    assert error["total"] == pytest.approx(hypot(error["half_step"], error["stiffer"]))
+
+
+def test_the_error_of_beads_that_cannot_be_harder_is_that_of_the_time_step(
+    hardest_steel: MeasuredRun,
+) -> None:
+    half_case = with_step_and_modulus(hardest_steel.run.case, 0.5, 1.0)
+    half = walkers.run(half_case, hardest_steel.folder)
+    assert half.cached
+    change = half.result["velocity"] - hardest_steel.run.result["velocity"]
+    error = hardest_steel.accuracy["errors"]["velocity"]
+    assert error["half_step"] == pytest.approx(change, rel=1e-9)
+    assert error["stiffer"] == 0.0
+    assert hardest_steel.accuracy["times"] == 1.0
+    assert hardest_steel.accuracy["change"] == 0.0
+
+
+WARNING = "warning: the beads cannot be harder"
+
+
+def test_a_result_of_beads_that_cannot_be_harder_warns(hardest_steel: MeasuredRun) -> None:
+    assert WARNING in hardest_steel.run.describe()
+
+
+def test_a_result_of_beads_that_can_be_harder_does_not_warn(steel: MeasuredRun) -> None:
+    assert WARNING not in steel.run.describe()
