@@ -1,4 +1,7 @@
-"""A throw-away SLURM cluster of one node: this machine, under daemons of its own that touch no other; a local site."""
+"""A throw-away SLURM cluster for tests, and a site without a scheduler.
+
+The cluster has one node, this machine, and daemons of its own, which touch no other cluster.
+"""
 
 from __future__ import annotations
 
@@ -43,8 +46,13 @@ from parsl import Config
 from parsl.executors import HighThroughputExecutor
 from parsl.providers import LocalProvider
 
-hearts = {"heartbeat_period": 1, "heartbeat_threshold": 3}
-pilots = HighThroughputExecutor(provider=LocalProvider(), address="127.0.0.1", max_workers_per_node=2, **hearts)
+pilots = HighThroughputExecutor(
+    provider=LocalProvider(),
+    address="127.0.0.1",
+    max_workers_per_node=2,
+    heartbeat_period=1,
+    heartbeat_threshold=3,
+)
 config = Config([pilots], strategy_period=0.5)
 """
 """A site file: pilots on this machine without a scheduler."""
@@ -52,71 +60,97 @@ config = Config([pilots], strategy_period=0.5)
 
 def why_not() -> str | None:
     """Why there can be no cluster here, or None."""
-    missing = [
-        name
-        for name in ("munged", "slurmctld", "slurmd", "sbatch")
-        if shutil.which(name, path=_PATH) is None
-    ]
-    if missing or os.getuid():
-        return f"a throw-away SLURM cluster is for root; missing: {', '.join(missing) or 'nothing'}"
+    missing = []
+    for name in ("munged", "slurmctld", "slurmd", "sbatch"):
+        if shutil.which(name, path=_PATH) is None:
+            missing.append(name)
+    if missing:
+        return f"a throw-away SLURM cluster needs {', '.join(missing)}"
+    if os.getuid() != 0:
+        return "a throw-away SLURM cluster is for root"
     return None
 
 
 @contextmanager
 def slurm_cluster(folder: Path) -> Iterator[dict[str, str]]:
-    """Start a cluster with its files in a folder; yields the environment in which SLURM's commands speak to it.
+    """Start a cluster with its files in a folder, and stop it at the end.
 
-    The folder and those above it must be closed to others, which munge insists on.
+    Parameters
+    ----------
+    folder
+        An empty folder. Munge insists that others can write neither to it nor to those above.
+
+    Yields
+    ------
+    dict
+        The environment in which the commands of SLURM speak to the cluster.
     """
-    probes = [socket.create_server(("127.0.0.1", 0)) for _ in range(2)]
-    ports = [probe.getsockname()[1] for probe in probes]
-    for probe in probes:
-        probe.close()
-    host, cores = socket.gethostname().split(".")[0], os.cpu_count()
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2**20 - 512
     for name in ("state", "spool", "munge"):
         (folder / name).mkdir()
+    host = socket.gethostname().split(".")[0]
     configuration = folder / "slurm.conf"
     configuration.write_text(
-        _CONFIGURATION.format(host=host, folder=folder, cores=cores, memory=memory, ports=ports)
+        _CONFIGURATION.format(
+            host=host,
+            folder=folder,
+            cores=os.cpu_count(),
+            memory=_megabytes_of_memory() - 512,
+            ports=_free_ports(2),
+        )
     )
     environment = {**os.environ, "PATH": _PATH, "SLURM_CONF": str(configuration)}
 
-    def asked(program: str, what: str) -> bytes:
-        """What a command of SLURM says; nothing if nobody answers."""
-        told = subprocess.run(
-            [program, "-h", "-o", what], env=environment, capture_output=True, check=False
+    def answer(command: str, columns: str) -> bytes:
+        """What a command of SLURM prints; nothing if no daemon answers."""
+        process = subprocess.run(
+            [command, "-h", "-o", columns], env=environment, capture_output=True, check=False
         )
-        return told.stdout.strip()
+        return process.stdout.strip()
 
     try:
         _start_munge(folder / "munge")
         for daemon in (["slurmctld"], ["slurmd", "-N", host]):
             subprocess.run([*daemon, "-f", str(configuration)], check=True, env=environment)
-        wait_for(lambda: asked("sinfo", "%T") == b"idle")
+        wait_for(lambda: answer("sinfo", "%T") == b"idle")
         yield environment
     finally:
         subprocess.run(
             ["scancel", "--user", "root"], env=environment, check=False, capture_output=True
         )
-        wait_for(lambda: not asked("squeue", "%A"))
+        wait_for(lambda: not answer("squeue", "%A"))
         for pid_file in (folder / "slurmd.pid", folder / "slurmctld.pid", folder / "munge" / "pid"):
-            with suppress(OSError, ValueError):
+            with suppress(OSError, ValueError):  # it did not start, or has ended
                 os.kill(int(pid_file.read_text()), signal.SIGTERM)
 
 
+def _free_ports(number: int) -> list[int]:
+    """Ports of this machine that are free; they are all open before any is closed again."""
+    probes = [socket.create_server(("127.0.0.1", 0)) for _ in range(number)]
+    ports = []
+    for probe in probes:
+        ports.append(probe.getsockname()[1])
+        probe.close()
+    return ports
+
+
+def _megabytes_of_memory() -> int:
+    """Memory of this machine, MiB."""
+    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2**20
+
+
 def _start_munge(folder: Path) -> None:
-    (folder / "key").write_bytes(os.urandom(128))
-    (folder / "key").chmod(0o600)
-    for path in (folder, folder / "key"):
-        shutil.chown(path, "munge", "munge")
-    places = {
-        "socket": "socket",
-        "key-file": "key",
-        "pid-file": "pid",
-        "log-file": "log",
-        "seed-file": "seed",
-    }
-    options = [f"--{name}={folder / place}" for name, place in places.items()]
+    """Start the daemon by which those of SLURM know each other, as the user munge."""
+    key = folder / "key"
+    key.write_bytes(os.urandom(128))
+    key.chmod(0o600)
+    shutil.chown(folder, "munge", "munge")
+    shutil.chown(key, "munge", "munge")
     as_munge = ["setpriv", "--reuid", "munge", "--regid", "munge", "--clear-groups"]
+    options = [
+        f"--socket={folder / 'socket'}",
+        f"--key-file={key}",
+        f"--pid-file={folder / 'pid'}",
+        f"--log-file={folder / 'log'}",
+        f"--seed-file={folder / 'seed'}",
+    ]
     subprocess.run([*as_munge, str(shutil.which("munged", path=_PATH)), *options], check=True)
