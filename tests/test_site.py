@@ -20,18 +20,28 @@ THEME = (
 )
 """What pydata-sphinx-theme says about formulas, before our own style sheet."""
 BLOCK = re.compile(r"^\$\$\n(.+?)\n\$\$$", re.MULTILINE | re.DOTALL)
-FORMULAS = {
-    f"{page.stem}-{number}": formula
-    for page in pages_of(DOCS)
-    for number, formula in enumerate(BLOCK.findall(page.read_text("utf-8")))
-}
 
+
+def formulas_of_pages() -> dict[str, str]:
+    """The formulas that stand by themselves on the pages, by page and number."""
+    formulas = {}
+    for page in pages_of(DOCS):
+        for number, formula in enumerate(BLOCK.findall(page.read_text("utf-8"))):
+            formulas[f"{page.stem}-{number}"] = formula
+    return formulas
+
+
+FORMULAS = formulas_of_pages()
 Measure = Callable[[str], dict[str, float]]
 
 
 @pytest.fixture(scope="module")
 def measure(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Measure]:
-    """Lay a formula out as MathML; give the widths of it and its box, and where it starts, in pixels."""
+    """Lay out a formula, given as MathML, in a browser and measure it.
+
+    The numbers are in pixels: the width that it ``needs``, the width that its box ``has``, and its
+    ``left`` edge in the box.
+    """
     from playwright.sync_api import sync_playwright
 
     folder = tmp_path_factory.mktemp("formulas")
@@ -41,7 +51,7 @@ def measure(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Measure]:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=flags)
         page = browser.new_page(viewport={"width": 1280, "height": 600})
 
-        def measured(mathml: str) -> dict[str, float]:
+        def measure_formula(mathml: str) -> dict[str, float]:
             body = f'<div style="width: {TEXT_WIDTH}px"><div class="math">{mathml}</div></div>'
             path = folder / "formula.html"
             path.write_text(
@@ -53,32 +63,33 @@ def measure(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Measure]:
                 """() => {
                     const box = document.querySelector("div.math");
                     const formula = box.firstElementChild;
-                    const left = formula.getBoundingClientRect().left - box.getBoundingClientRect().left;
+                    const edge = box.getBoundingClientRect().left;
+                    const left = formula.getBoundingClientRect().left - edge;
                     return {needs: box.scrollWidth, has: box.clientWidth, left};
                 }"""
             )
             return numbers
 
-        yield measured
+        yield measure_formula
         browser.close()
 
 
 def test_a_formula_that_is_too_wide_shows_its_beginning(measure: Measure) -> None:
-    wide = "<math display='block'>" + "<mi>a</mi><mo>+</mo>" * 80 + "<mi>b</mi></math>"
-    laid_out = measure(wide)
-    assert laid_out["needs"] > laid_out["has"]
-    assert laid_out["left"] >= 0.0
+    """A sum of 81 terms; what does not fit must be on its right."""
+    terms = "<mi>a</mi><mo>+</mo>" * 80 + "<mi>b</mi>"
+    pixels = measure(f"<math display='block'>{terms}</math>")
+    assert pixels["needs"] > pixels["has"]
+    assert pixels["left"] >= 0.0
 
 
 @pytest.mark.parametrize("formula", FORMULAS.values(), ids=FORMULAS.keys())
 def test_formulas_fit_into_a_page_at_1280_pixels(formula: str, measure: Measure) -> None:
-    """With the packages of `make docs`, whose converter makes MathML of the formulas."""
-    pytest.importorskip(
-        "sphinx", reason="the formulas are converted by the packages of `make docs`"
-    )
+    """The packages of `make docs` convert the formulas to MathML."""
+    reason = "the formulas are converted by the packages of `make docs`"
+    pytest.importorskip("sphinx", reason=reason)
     from docutils import nodes
 
     from docs._ext import mathml
 
-    laid_out = measure(mathml._mathml(nodes.math_block(formula, formula), block=True))
-    assert laid_out["needs"] <= laid_out["has"]
+    pixels = measure(mathml._mathml(nodes.math_block(formula, formula), block=True))
+    assert pixels["needs"] <= pixels["has"]
