@@ -1,11 +1,11 @@
-"""Measure the speeds that docs/explanation/other-codes.md states: ``make bench-codes`` prints its table.
+"""Measure the speeds in docs/explanation/other-codes.md: ``make bench-codes`` prints its table.
 
-The same beads, from the end of a shaken pile, in liggghts and in Debian's lammps and yade: with the same sizes,
-density, walls, drive and time step, on one core. Codes run in turn, several times.
+The same beads, from the end of a shaken pile, in liggghts and in Debian's lammps and yade: with the
+same sizes, density, walls, drive and time step, on one core. Codes run in turn, several times.
 
-Beads at rest must touch as many neighbours in each code, or the comparison is of unlike piles: without adhesion, beads
-that bridges had pressed together spring apart, and a dry pile would be timed in flight. Dry piles are therefore settled
-first, by their own code, until they lie.
+Beads at rest must touch as many neighbours in each code, or the comparison is of unlike piles.
+Without adhesion, beads that bridges had pressed together spring apart, and a dry pile would be
+timed in flight. Dry piles are therefore settled first, by their own code, until they lie.
 """
 
 from __future__ import annotations
@@ -14,11 +14,10 @@ import re
 import shutil
 import tempfile
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from math import atan
 from pathlib import Path
 from statistics import median
-from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -34,16 +33,18 @@ from tests.benchmark import (
     shaken,
     without_steps,
 )
+from walkers.arrays import FloatArray
 from walkers.inputs.reading import load_case
 from walkers.inputs.tables.case import Case
 from walkers.physics.capillary import bead_volume
 from walkers.postprocess.measure.dump import BinaryDump
 from walkers.runner.run_directory import write_deck
+from walkers.templates.deck import Deck
 from walkers.templates.layout import BEAD_COLUMNS
 from walkers.templates.placement import Bead
 
-_PILES = {"pile-small": 20_000, "pile-fig1a": 6_000}
-"""Cases and steps."""
+_STEPS = {"pile-small": 20_000, "pile-fig1a": 6_000}
+"""Number of timed steps of each case."""
 _SETTLING_STEPS = {"pile-small": 300_000, "pile-fig1a": 150_000}
 """Steps after which dry beads lie at rest."""
 _SETTLED = "settled.restart"
@@ -88,22 +89,35 @@ _YADE_PILE = """
 from yade import *
 import numpy
 liquid = dict(Capillar=True, CapillarType="Rabinovich", Vb={bridge}, gamma={tension}, theta=0.0)
-material = ViscElCapMat(density={density}, frictionAngle={angle}, tc=4e-5, en={e}, et={e}, **liquid)
+material = ViscElCapMat(
+    density={density}, frictionAngle={angle}, tc=4e-5, en={e}, et={e}, **liquid
+)
 O.materials.append(material)
 swing = {peak} / (2.0 * numpy.pi * {frequency})
 for x, y, z, radius, vx, vy, vz, wx, wy, wz in numpy.loadtxt("beads.txt"):
     bead = sphere((x, y, z), radius, material=material)
-    bead.state.vel, bead.state.angVel = (vx, vy, vz + swing), (wx, wy, wz)
+    bead.state.vel = (vx, vy, vz + swing)
+    bead.state.angVel = (wx, wy, wz)
     O.bodies.append(bead)
-beads, planes = list(O.bodies), [(2, 0.0), (0, -{half}), (0, {half}), (1, -{half}), (1, {half})]
+beads = list(O.bodies)
+planes = [(2, 0.0), (0, -{half}), (0, {half}), (1, -{half}), (1, {half})]
 walls = O.bodies.append([wall(place, axis, material=material) for axis, place in planes])
-shapes = Bo1_Sphere_Aabb(aabbEnlargeFactor=1.2), Bo1_Wall_Aabb()
-meetings = Ig2_Sphere_Sphere_ScGeom(interactionDetectionFactor=1.2), Ig2_Wall_Sphere_ScGeom()
-laws = [Ip2_ViscElCapMat_ViscElCapMat_ViscElCapPhys()], [Law2_ScGeom_ViscElCapPhys_Basic()]
-shake = dict(A=(0, 0, swing / (2.0 * numpy.pi * {frequency})), f=(0, 0, {frequency}), fi=(0, 0, -numpy.pi / 2.0))
+shapes = [Bo1_Sphere_Aabb(aabbEnlargeFactor=1.2), Bo1_Wall_Aabb()]
+meetings = [Ig2_Sphere_Sphere_ScGeom(interactionDetectionFactor=1.2), Ig2_Wall_Sphere_ScGeom()]
+physics = [Ip2_ViscElCapMat_ViscElCapMat_ViscElCapPhys()]
+laws = [Law2_ScGeom_ViscElCapPhys_Basic()]
+shaking = HarmonicMotionEngine(
+    ids=walls,
+    A=(0, 0, swing / (2.0 * numpy.pi * {frequency})),
+    f=(0, 0, {frequency}),
+    fi=(0, 0, -numpy.pi / 2.0),
+)
 O.engines = [
-    ForceResetter(), InsertionSortCollider(list(shapes)), InteractionLoop(list(meetings), *laws),
-    HarmonicMotionEngine(ids=walls, **shake), NewtonIntegrator(damping=0.0, gravity=(0, 0, -{gravity})),
+    ForceResetter(),
+    InsertionSortCollider(shapes),
+    InteractionLoop(meetings, physics, laws),
+    shaking,
+    NewtonIntegrator(damping=0.0, gravity=(0, 0, -{gravity})),
 ]
 O.dt = {dt}
 if STEPS: O.run(STEPS, True)
@@ -111,10 +125,20 @@ numpy.savetxt("{end}", [bead.state.pos for bead in beads])
 """
 
 
-class Script(NamedTuple):
-    """How to run a code: its command, its input with STEPS for the number of steps, its environment.
+@dataclass(frozen=True)
+class Script:
+    """How to run a code.
 
-    ``settling`` is the input that settles the beads first, in the same folder; empty if they lie already.
+    Attributes
+    ----------
+    command
+        The command, without its input file.
+    text
+        The input, with the word STEPS for the number of steps.
+    environment
+        The environment of the command.
+    settling
+        The input that settles the beads first, in the same folder; empty if they lie already.
     """
 
     command: tuple[str, ...]
@@ -123,37 +147,79 @@ class Script(NamedTuple):
     settling: str = ""
 
 
+@dataclass(frozen=True)
+class Start:
+    """The beads from which codes start, and how they are shaken.
+
+    Attributes
+    ----------
+    case
+        Name of the case of the pile.
+    beads
+        The beads.
+    peak
+        Peak acceleration of the drive, m/s²; None: that of the case.
+    """
+
+    case: str
+    beads: list[Bead]
+    peak: float | None = None
+
+
+@dataclass
+class Timing:
+    """What was measured of a code, a number for each repetition."""
+
+    speeds: list[float] = field(default_factory=list)
+    """Million bead-steps/s."""
+    neighbours: list[float] = field(default_factory=list)
+    """Touching neighbours of a bead at the end."""
+
+    def cells(self) -> str:
+        """The medians as cells of the table."""
+        return f"{median(self.speeds):.1f} | {median(self.neighbours):.1f} |"
+
+
 def main() -> None:
     """Print bead-steps per second and touching neighbours at the end, shaken and at rest."""
-    print(
-        "| code | beads | shaken: M bead-steps/s | neighbours | at rest: M bead-steps/s | neighbours |"
-    )
+    shaken_columns = "shaken: M bead-steps/s | neighbours"
+    columns_at_rest = "at rest: M bead-steps/s | neighbours"
+    print(f"| code | beads | {shaken_columns} | {columns_at_rest} |")
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
-        for case, steps in _PILES.items():
-            beads, rows = shaken(case, Path(folder)), dict[str, list[list[float]]]()
-            still = [
-                replace(bead, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) for bead in beads
-            ]
-            for _ in range(REPEATS):
-                for column, (start, peak) in enumerate(((beads, None), (still, 0.0))):
-                    for code, script in scripts(
-                        case, start, steps, Path(folder) / f"{case}-{column}", peak
-                    ).items():
-                        place = Path(folder) / f"{case}-{column}" / re.sub(r"\W+", "-", code)
-                        _settle(script, place, _SETTLING_STEPS[case])
-                        seconds = cpu_time(
-                            place, script.command, script.text, steps, script.environment
-                        )
-                        row = rows.setdefault(code, [[] for _ in range(4)])
-                        row[2 * column].append(1e-6 * len(beads) * steps / seconds)
-                        row[2 * column + 1].append(_neighbours(place, beads))
-            for code, row in rows.items():
-                print(
-                    f"| {code} | {len(beads)} |",
-                    *(f"{median(values):.1f} |" for values in row),
-                    flush=True,
-                )
+        for case in _STEPS:
+            _print_rows(case, Path(folder))
+
+
+def _print_rows(case: str, folder: Path) -> None:
+    """Time all codes with a pile, shaken and at rest in turn, and print a row for each."""
+    beads = shaken(case, folder)
+    at_rest = [replace(bead, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) for bead in beads]
+    timings_shaken: dict[str, Timing] = {}
+    timings_at_rest: dict[str, Timing] = {}
+    for _ in range(REPEATS):
+        _time_codes(Start(case, beads), folder / f"{case}-shaken", timings_shaken)
+        _time_codes(Start(case, at_rest, peak=0.0), folder / f"{case}-rest", timings_at_rest)
+    for code, timing in timings_shaken.items():
+        cells = f"{timing.cells()} {timings_at_rest[code].cells()}"
+        print(f"| {code} | {len(beads)} | {cells}", flush=True)
+
+
+def _time_codes(start: Start, folder: Path, timings: dict[str, Timing]) -> None:
+    """Time each code once, and add its numbers to the timings by code."""
+    steps = _STEPS[start.case]
+    for code, script in scripts(start, steps, folder).items():
+        place = _place(folder, code)
+        _settle(script, place, _SETTLING_STEPS[start.case])
+        seconds = cpu_time(place, script.command, script.text, steps, script.environment)
+        timing = timings.setdefault(code, Timing())
+        timing.speeds.append(1e-6 * len(start.beads) * steps / seconds)
+        timing.neighbours.append(_neighbours(place, start.beads))
+
+
+def _place(folder: Path, code: str) -> Path:
+    """The folder of a code."""
+    return folder / re.sub(r"\W+", "-", code)
 
 
 def _settle(script: Script, place: Path, steps: int) -> None:
@@ -162,63 +228,77 @@ def _settle(script: Script, place: Path, steps: int) -> None:
         cpu_time(place, script.command, script.settling, steps, script.environment)
 
 
-def scripts(
-    case: str, beads: list[Bead], steps: int, folder: Path, peak: float | None
-) -> dict[str, Script]:
-    """Scripts of a pile for the codes that are installed; each code has its files in a folder by its name.
+def scripts(start: Start, steps: int, folder: Path) -> dict[str, Script]:
+    """Scripts of a pile for the codes that are installed, by the names of the codes.
 
-    ``peak`` is the acceleration of the drive, m/s²; None for that of the case.
+    Each code has its files in a folder of its own.
     """
-    deck, loaded = compose_from(case, steps, beads), load_case(case)
-    stock_deck = compose_for_stock(case, steps, beads)
-    values = _values(loaded, peak)
-    changed = r"\g<1> {peak!r}".format(**values)
-    ours, stock = (
-        re.sub(r"(peak_acceleration string) \S+", changed, one)
-        for one in (deck.text, minimal(stock_deck, loaded))
-    )
-    material = "{modulus} {e} {poisson}".format(**values)
-    slip = "tangential mindlin NULL 1.0 {friction} damping tsuji".format(**values)
-    found = {
-        "this project: Young–Laplace": Script(
-            ENGINE, without_steps(ours), environment(stock=False)
-        ),
-        "liggghts: easo": Script(ENGINE, without_steps(stock), environment(stock=True)),
-    }
+    case = load_case(start.case)
+    values = _values(case, start.peak)
+    deck = compose_from(start.case, steps, start.beads)
+    by_code = _scripts_of_liggghts(deck, start, steps, values)
     if shutil.which(_LAMMPS[0]):
-        laws = {
-            "lammps: granular, DMT": (_GRANULAR, f"dmt {material} {values['tension']} {slip}"),
-            "lammps: granular, dry": (_GRANULAR, f"hertz/material {material} {slip}"),
-            "lammps: hertz/history, dry": (
-                _HISTORY,
-                "{stiffness} NULL 3e9 NULL {friction} 1".format(**values),
-            ),
-        }
-        for name, (block, law) in laws.items():
-            contacts = block.format(law=law, **values)
-            fresh = _LAMMPS_PILE.format(start="read_data lammps.data", contacts=contacts, **values)
-            if peak == 0.0 and name.endswith("dry"):
-                settled = _LAMMPS_PILE.format(
-                    start=f"read_restart {_SETTLED}", contacts=contacts, **values
-                )
-                found[name] = Script(
-                    _LAMMPS, settled, environment(stock=True), fresh + _SETTLE_AND_KEEP
-                )
-            else:
-                found[name] = Script(_LAMMPS, fresh, environment(stock=True))
+        by_code |= _scripts_of_lammps(values, is_at_rest=start.peak == 0.0)
     if shutil.which(_YADE[0]):
-        found["yade: Rabinovich"] = Script(_YADE, _YADE_PILE.format(**values), {})
-    for name in found:
-        place = folder / re.sub(r"\W+", "-", name)
+        by_code["yade: Rabinovich"] = Script(_YADE, _YADE_PILE.format(**values), {})
+    for code in by_code:
+        place = _place(folder, code)
         place.mkdir(parents=True, exist_ok=True)
         write_deck(deck, place)
-        _write_beads(place, beads, loaded)
-    return found
+        _write_beads(place, start.beads, case)
+    return by_code
+
+
+def _scripts_of_liggghts(
+    deck: Deck, start: Start, steps: int, values: Mapping[str, float | str]
+) -> dict[str, Script]:
+    """The deck of this project, and one of the engine's own capillary model."""
+
+    def with_peak(text: str) -> str:
+        peak = rf"\g<1> {values['peak']!r}"
+        return without_steps(re.sub(r"(peak_acceleration string) \S+", peak, text))
+
+    stock_deck = compose_for_stock(start.case, steps, start.beads)
+    stock_text = minimal(stock_deck, load_case(start.case))
+    return {
+        "this project: Young–Laplace": Script(
+            ENGINE, with_peak(deck.text), environment(stock=False)
+        ),
+        "liggghts: easo": Script(ENGINE, with_peak(stock_text), environment(stock=True)),
+    }
+
+
+def _scripts_of_lammps(values: Mapping[str, float | str], *, is_at_rest: bool) -> dict[str, Script]:
+    """The contact models of LAMMPS; dry beads at rest are settled first."""
+    material = "{modulus} {e} {poisson}".format(**values)
+    sliding = "tangential mindlin NULL 1.0 {friction} damping tsuji".format(**values)
+    adhesive_law = f"dmt {material} {values['tension']} {sliding}"
+    history_law = "{stiffness} NULL 3e9 NULL {friction} 1".format(**values)
+    contacts = {
+        "lammps: granular, DMT": _GRANULAR.format(law=adhesive_law, **values),
+        "lammps: granular, dry": _GRANULAR.format(
+            law=f"hertz/material {material} {sliding}", **values
+        ),
+        "lammps: hertz/history, dry": _HISTORY.format(law=history_law, **values),
+    }
+    by_code = {}
+    for code, commands in contacts.items():
+        script = _LAMMPS_PILE.format(start="read_data lammps.data", contacts=commands, **values)
+        settling = ""
+        if is_at_rest and code.endswith("dry"):
+            settling = script + _SETTLE_AND_KEEP
+            start = f"read_restart {_SETTLED}"
+            script = _LAMMPS_PILE.format(start=start, contacts=commands, **values)
+        by_code[code] = Script(_LAMMPS, script, environment(stock=True), settling)
+    return by_code
 
 
 def _values(case: Case, peak: float | None) -> dict[str, float | str]:
-    """Numbers that the scripts contain, in SI units."""
-    (harmonic,), contact = case.excitation.harmonics, case.contact
+    """Numbers that the scripts contain, in SI units; a peak of None is that of the case."""
+    (harmonic,) = case.excitation.harmonics
+    if peak is None:
+        peak = harmonic.peak_acceleration
+    contact = case.contact
     reduced = contact.youngs_modulus / (2.0 * (1.0 - contact.poissons_ratio**2))
     return {
         "modulus": contact.youngs_modulus,
@@ -232,7 +312,7 @@ def _values(case: Case, peak: float | None) -> dict[str, float | str]:
         "density": case.beads.density,
         "half": 0.5 * case.boundary.width,
         "gravity": case.environment.gravity,
-        "peak": harmonic.peak_acceleration if peak is None else peak,
+        "peak": peak,
         "frequency": harmonic.frequency,
         "dt": case.run.time_step,
         "end": _END,
@@ -243,40 +323,53 @@ def _write_beads(place: Path, beads: list[Bead], case: Case) -> None:
     """The beads as files for LAMMPS and YADE."""
     rows = [(*bead.centre, bead.radius, *bead.velocity, *bead.spin) for bead in beads]
     np.savetxt(place / "beads.txt", rows, fmt="%.17g")
-    half, top = (
-        0.5 * case.boundary.width + 2e-4,
-        max(bead.centre[2] for bead in beads) + case.boundary.height,
-    )
-    lines = ["beads", "", f"{len(beads)} atoms", "1 atom types", ""]
-    lines += [f"-{half} {half} {axis}lo {axis}hi" for axis in "xy"] + [
+    half = 0.5 * case.boundary.width + 2e-4
+    top = max(bead.centre[2] for bead in beads) + case.boundary.height
+    lines = [
+        "beads",
+        "",
+        f"{len(beads)} atoms",
+        "1 atom types",
+        "",
+        f"-{half} {half} xlo xhi",
+        f"-{half} {half} ylo yhi",
         f"-2e-4 {top} zlo zhi",
         "",
         "Atoms # sphere",
         "",
     ]
     for bead in beads:
-        lines.append(
-            " ".join(map(repr, (bead.id, 1, 2.0 * bead.radius, case.beads.density, *bead.centre)))
-        )
+        lines.append(_row(bead.id, 1, 2.0 * bead.radius, case.beads.density, *bead.centre))
     lines += ["", "Velocities", ""]
-    lines += [" ".join(map(repr, (bead.id, *bead.velocity, *bead.spin))) for bead in beads]
+    for bead in beads:
+        lines.append(_row(bead.id, *bead.velocity, *bead.spin))
     (place / "lammps.data").write_text("\n".join(lines) + "\n", "utf-8")
 
 
+def _row(*numbers: float) -> str:
+    """Numbers with all digits."""
+    return " ".join(map(repr, numbers))
+
+
 def _neighbours(place: Path, beads: list[Bead]) -> float:
-    """Touching neighbours of a bead at the end of the last run: from the last lines of a text, or the last frame."""
-    if (end := place / _END).exists():
-        centres = np.loadtxt(end.read_text("utf-8").splitlines()[-len(beads) :])
-        end.unlink()
-    else:
-        centres = BinaryDump(place / "beads.bin", BEAD_COLUMNS).stack()[-1][:, 3:6]
+    """Mean number of touching neighbours of a bead at the end of the last run."""
+    centres = _centres_at_end(place, len(beads))
     radii = np.array([bead.radius for bead in beads])
-    one, other = cKDTree(centres).query_pairs(2.0 * radii.max(), output_type="ndarray").T
-    return (
-        2.0
-        * np.sum(np.linalg.norm(centres[one] - centres[other], axis=1) < radii[one] + radii[other])
-        / len(beads)
-    )
+    pairs = cKDTree(centres).query_pairs(2.0 * radii.max(), output_type="ndarray")
+    first, second = pairs.T
+    distances = np.linalg.norm(centres[first] - centres[second], axis=1)
+    touching = np.count_nonzero(distances < radii[first] + radii[second])
+    return 2.0 * touching / len(beads)
+
+
+def _centres_at_end(place: Path, count: int) -> FloatArray:
+    """Centres of the beads, m, shape (N, 3): the last lines of a text, or the last frame."""
+    end = place / _END
+    if end.exists():
+        lines = end.read_text("utf-8").splitlines()[-count:]
+        end.unlink()
+        return np.loadtxt(lines)
+    return BinaryDump(place / "beads.bin", BEAD_COLUMNS).stack()[-1][:, 3:6]
 
 
 if __name__ == "__main__":
