@@ -78,7 +78,7 @@ def test_a_number_agrees_within_a_deviation_of_what_is_said(
 
 
 def test_a_number_that_does_not_exist_agrees_with_no_fact() -> None:
-    for observation in (SPEED, LOWER_LIMIT, UPPER_LIMIT, BOTH_LIMITS):
+    for observation in (SPEED, LOWER_LIMIT, UPPER_LIMIT, BOTH_LIMITS, ANGLE):
         assert not observation.agrees(np.nan)
 
 

@@ -42,7 +42,7 @@ from walkers.postprocess.measure.uncertainty import ACCURACY_NAME, SPREAD_NAME, 
 from walkers.postprocess.measure.walking import _velocities
 from walkers.rounding import rounded
 from walkers.runs.case_text import quantity_kind
-from walkers.sweeps.accuracy import SHARE, measure_accuracy, modulus_factors
+from walkers.sweeps.accuracy import measure_accuracy, modulus_factors
 from walkers.sweeps.listing import inventory, listing_text
 from walkers.sweeps.scheduler import SweepOptions
 from walkers.sweeps.table import default_column
@@ -139,11 +139,11 @@ def steep(once: FillOnce) -> walkers.Run:
 
 
 def test_walkers_that_face_up_and_down_a_slope_differ(steep: walkers.Run) -> None:
-    """The one that faces up is slower; the result has the velocity of each."""
+    """Both go down, the one that faces up backward; the result has the velocity of each."""
     velocity = steep.walkers.set_index("facing")["velocity"]
     assert steep.result["right_facing"] == velocity[1]
     assert steep.result["left_facing"] == velocity[-1]
-    assert velocity[1] < velocity[-1]
+    assert velocity[1] < 0.0 < velocity[-1]
     assert steep.result["facings_differ"]
 
 
@@ -170,7 +170,7 @@ def test_the_theory_is_beside_the_engines_walkers_that_face_up(steep: walkers.Ru
 
 
 def test_the_printed_result_of_a_slope_has_the_velocities_of_both_ways(steep: walkers.Run) -> None:
-    """The mean over both would be no walker's velocity."""
+    """Instead of a single one."""
     printed = {row.name: row.text for row in rows(steep.result)}
     assert "velocity" not in printed
     for name in ("axial_velocity", "axial_left_facing"):
@@ -221,9 +221,10 @@ def test_on_a_slope_the_band_of_the_walkers_that_face_up_is_printed(
     assert printed_error(banded("right_facing").result, "right_facing").endswith("(64 draws)")
 
 
-def test_on_a_slope_the_band_of_the_mean_over_both_ways_is_not_printed(
+def test_on_a_slope_a_band_of_the_velocity_is_not_printed(
     banded: Callable[[str], walkers.Run],
 ) -> None:
+    """What is printed there are the velocities of both headings."""
     assert not printed_error(banded("velocity").result, "right_facing").endswith("(64 draws)")
 
 
@@ -535,14 +536,14 @@ def test_the_error_is_the_distance_from_far_harder_beads_at_a_far_smaller_step(
     velocity = fast_walker.run.result["velocity"]
     change = fast_walker.accuracy["errors"]["velocity"]["stiffer"]
     assert fast_walker.accuracy["reached"]
-    assert abs(velocity + change - limit) < SHARE * limit
+    assert abs(velocity + change - limit) < fast_walker.accuracy["share"] * limit
 
 
 @pytest.mark.slow
 def test_harder_beads_walk_slower_because_the_large_one_slides_more(
     fast_walker: MeasuredRun,
 ) -> None:
-    """By more than 1 %; the large bead slides backward by twice as much as the walker loses."""
+    """The velocity falls by more than 1 %, sliding of the large bead by over twice as much."""
     errors = fast_walker.accuracy["errors"]
     assert errors["velocity"]["stiffer"] < -0.01 * fast_walker.run.result["velocity"]
     assert errors["sliding_1"]["stiffer"] < 2.0 * errors["velocity"]["stiffer"]
@@ -606,7 +607,7 @@ def test_numerical_errors_have_labels_and_stand_beside_their_numbers() -> None:
 
 
 def test_an_interrupted_accuracy_continues(tmp_path: Path) -> None:
-    """It is interrupted when two of its runs are finished, which are not made again."""
+    """It is interrupted when some of its runs are finished, which are not made again."""
     run = walkers.run(make_case(run=QUICK), tmp_path)
 
     def interrupt(_: object) -> None:
@@ -688,7 +689,7 @@ def test_an_edited_accuracy_can_be_measured_again(
 
 
 def make_steel_case(megapascals: float) -> Case:
-    """Two steel beads with a Young's modulus in contact; that of steel is at most 100 GPa here."""
+    """Two steel beads with a Young's modulus, which may be at most 100 GPa."""
     return build_case(
         {
             "dimers": {"diameters": ["10 mm", "7 mm"], "replicates": 1},
