@@ -646,43 +646,51 @@ LONE = {"name": "v", "group": "v", "of": ["slow"], "value": "1 mm/s", "deviation
 
 
 @pytest.fixture(scope="module")
-def rough_and_smooth(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> tuple[dict[str, float], dict[str, float]]:
+def rough_and_smooth(once: FillOnce) -> dict[str, dict[str, float]]:
     """Quantities of a walker with much friction in thin liquid, and of one with the reverse."""
-    folder = tmp_path_factory.mktemp("rough-and-smooth")
-    calibration = make_calibration(
-        folder,
-        experiments={"slow": {"drive.peak_acceleration": "6 g"}},
-        observations=[LONE],
-        design={},
-    )
-    rough = run_experiments(calibration, [0.2, 0.5], folder / "runs", "rough")
-    smooth = run_experiments(calibration, [0.06, 2.0], folder / "runs", "smooth")
-    return rough["slow"], smooth["slow"]
+
+    def run_both(folder: Path) -> None:
+        calibration = make_calibration(
+            folder,
+            experiments={"slow": {"drive.peak_acceleration": "6 g"}},
+            observations=[LONE],
+            design={},
+        )
+        rough = run_experiments(calibration, [0.2, 0.5], folder / "runs", "rough")
+        smooth = run_experiments(calibration, [0.06, 2.0], folder / "runs", "smooth")
+        quantities = {"rough": rough["slow"], "smooth": smooth["slow"]}
+        (folder / "quantities.json").write_text(json.dumps(quantities))
+
+    folder = once("rough-and-smooth", run_both)
+    quantities: dict[str, dict[str, float]] = json.loads((folder / "quantities.json").read_text())
+    return quantities
 
 
 def test_a_bead_that_cannot_slide_rolls_and_one_without_friction_is_dragged(
-    rough_and_smooth: tuple[dict[str, float], dict[str, float]],
+    rough_and_smooth: dict[str, dict[str, float]],
 ) -> None:
     """How much the large bead slides, relative to its velocity within the cycle."""
-    rough, smooth = rough_and_smooth
-    assert rough["slip_1"] < 0.02
-    assert smooth["slip_1"] > 5.0 * rough["slip_1"]
+    rough_slip = rough_and_smooth["rough"]["slip_1"]
+    assert rough_slip < 0.02
+    assert rough_and_smooth["smooth"]["slip_1"] > 5.0 * rough_slip
 
 
 def test_the_velocity_of_a_walker_is_that_of_rolling_and_of_sliding(
-    rough_and_smooth: tuple[dict[str, float], dict[str, float]],
+    rough_and_smooth: dict[str, dict[str, float]],
 ) -> None:
-    rough, _ = rough_and_smooth
+    rough = rough_and_smooth["rough"]
     assert rough["velocity"] == pytest.approx(rough["rotation_1"] + rough["sliding_1"], rel=0.02)
 
 
 @pytest.fixture(scope="module")
-def early_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def early_run(once: FillOnce) -> Path:
     """The directory of a run that ended before its last cycle, when its velocity was constant."""
-    folder = tmp_path_factory.mktemp("early")
-    return run(load_case("fig1b", {"dimers.replicates": 1}), folder).directory
+
+    def run_case(folder: Path) -> None:
+        run(load_case("fig1b", {"dimers.replicates": 1}), folder)
+
+    (directory,) = once("early-run", run_case).glob("fig1b-*")
+    return directory
 
 
 def test_a_run_that_ended_early_slides_as_one_of_so_many_cycles(
@@ -1064,7 +1072,7 @@ def test_a_range_with_values_that_a_case_refuses_is_told_before_anything_is_writ
 
 def test_a_case_without_dimers_is_told_before_anything_is_written(tmp_path: Path) -> None:
     experiments = {name: {"drive.frequency": "170 Hz"} for name in REDUCED["experiments"]}
+    calibration = make_calibration(tmp_path, case="pile-ci", set={}, experiments=experiments)
     with pytest.raises(InputError, match="expected a case of dimers"):
-        calibration = make_calibration(tmp_path, case="pile-ci", set={}, experiments=experiments)
         calibrate(calibration, tmp_path / "runs", SweepOptions(1))
     assert not (tmp_path / "runs").exists()

@@ -16,6 +16,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 import walkers
 from tests.conftest import TINY, FillOnce, document, to_toml
@@ -114,9 +115,14 @@ def drawn_series(panel: Axes) -> list[DrawnSeries]:
     return series
 
 
+def theory_lines(panel: Axes) -> list[Line2D]:
+    """The dashed and dotted lines, which are those of the theory."""
+    return [line for line in panel.lines if line.get_linestyle() in ("--", ":")]
+
+
 def theory_curves(panel: Axes) -> list[tuple[FloatArray, FloatArray]]:
-    """The x and the y of each dashed or dotted line, which are those of the theory."""
-    return [line.get_data() for line in panel.lines if line.get_linestyle() in ("--", ":")]
+    """The x and the y of each line of the theory."""
+    return [line.get_data() for line in theory_lines(panel)]
 
 
 def legend_of(figure: Figure) -> list[str]:
@@ -699,45 +705,28 @@ def velocities_of_theory(runs: Sequence[str]) -> dict[str, list[float]]:
     return velocities
 
 
-@pytest.fixture(scope="module")
-def grid_with_theory(looked_through: Path) -> Figure:
-    """Velocity against peak acceleration at 60 and 80 Hz, with the theory."""
-    return walkers.load(looked_through / "grid").figure(theory=True)
-
-
-@pytest.fixture(scope="module")
-def theory_at_80_hz(looked_through: Path) -> dict[str, list[float]]:
-    """The velocities of the theory at the three points of 80 Hz, mm/s, by model."""
-    table = walkers.load(looked_through / "grid").table()
-    return velocities_of_theory(table.loc[table["drive.frequency"] == 80.0, "run"])
-
-
-def test_the_legend_names_the_models_after_the_colours(grid_with_theory: Figure) -> None:
-    assert legend_of(grid_with_theory)[2:] == [COULOMB_MODEL, PAPER_FIT]
-
-
-@pytest.mark.parametrize(("style", "model"), [("--", "viscous"), (":", "paper")])
-def test_the_curve_of_a_model_goes_through_its_velocity_at_each_point(
-    style: str, model: str, grid_with_theory: Figure, theory_at_80_hz: dict[str, list[float]]
+def test_the_theory_of_a_sweep_is_a_curve_of_each_model_through_its_velocity_at_each_point(
+    looked_through: Path,
 ) -> None:
-    """The points of 80 Hz have the second colour; the curve spans their range."""
-    panel = only_panel(grid_with_theory)
+    """Checked at 80 Hz, whose points have the second colour; the curves span their range."""
+    sweep = walkers.load(looked_through / "grid")
+    figure = sweep.figure(theory=True)
+    assert legend_of(figure)[2:] == [COULOMB_MODEL, PAPER_FIT]
+    panel = only_panel(figure)
     points = drawn_series(panel)[1].x
-    lines = []
-    for line in panel.lines:
-        if line.get_color() == COLOURS[1] and line.get_linestyle() == style:
-            lines.append(line)
-    (curve,) = lines
-    x = np.asarray(curve.get_xdata())
-    y = np.asarray(curve.get_ydata())
-    assert len(x) == THEORY_POINTS
-    assert x[0] == min(points)
-    assert x[-1] == max(points)
-    assert np.interp(points, x, y) == pytest.approx(theory_at_80_hz[model], rel=5e-3)
-    # The axis shows some of it.
-    low, high = panel.get_ylim()
-    assert low < y.max()
-    assert y.min() < high
+    curves = [line for line in theory_lines(panel) if line.get_color() == COLOURS[1]]
+    table = sweep.table()
+    velocities = velocities_of_theory(table.loc[table["drive.frequency"] == 80.0, "run"])
+    for curve, style, model in zip(curves, ("--", ":"), ("viscous", "paper"), strict=True):
+        assert curve.get_linestyle() == style
+        x, y = map(np.asarray, curve.get_data())
+        assert len(x) == THEORY_POINTS
+        assert [x[0], x[-1]] == [min(points), max(points)]
+        assert np.interp(points, x, y) == pytest.approx(velocities[model], rel=5e-3)
+        # The axis shows some of it.
+        low, high = panel.get_ylim()
+        assert low < y.max()
+        assert y.min() < high
 
 
 def test_a_column_that_the_theory_does_not_have_is_said(looked_through: Path) -> None:
