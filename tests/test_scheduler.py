@@ -99,9 +99,10 @@ def sweep_file(in_folder: Path) -> Callable[..., str]:
 def test_walkers_that_meet_are_taken_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """They have more room than they need, so the distance that counts as near is made larger."""
     monkeypatch.setattr("walkers.runs.splitting.NEAR", 1e3)
-    cases = [make_case(run={**TINY, "seed": seed}) for seed in (1, 2)]
+    first = make_case(run={**TINY, "seed": 1})
+    second = make_case(run={**TINY, "seed": 2})
     with pytest.raises(WalkersMet):
-        make_runs(cases, tmp_path, find_engine())
+        make_runs([first, second], tmp_path, find_engine())
     assert not list(tmp_path.glob("*"))
 
 
