@@ -1,12 +1,15 @@
-"""Golden numbers: what shipped cases and sweeps compute, to compare before and after a change of the program.
+"""Golden numbers: what shipped cases and sweeps compute, before and after a change of the program.
 
-    python tests/tools/golden.py compare            # everything; exit status 1 and a list if anything differs
+    python tests/tools/golden.py compare            # everything; exit status 1 and a list if
+                                                    # anything differs
     python tests/tools/golden.py compare decks      # one part: decks or runs
-    python tests/tools/golden.py freeze [PART ...]  # write the golden numbers anew, after a change that is meant
+    python tests/tools/golden.py freeze [PART ...]  # write the golden numbers anew, after a
+                                                    # change that is meant
 
-``decks``: what determines the run of each point of each shipped case and sweep, and of up to 25 points a sweep the
-deck's text, its tables and its layout. ``runs``: each column of each table (bytes) and each number of the result of a
-dozen finished runs, which are made anew in ``runs/golden``.
+``decks``: what determines the run of each point of each shipped case and sweep, and of up to 25
+points a sweep the deck's text, its tables and its layout. ``runs``: each column of each table
+(bytes) and each number of the result of a dozen finished runs, which are made anew in
+``runs/golden``.
 
 Digests of tables are those of one machine's arithmetic: freeze on the machine that compares.
 """
@@ -17,8 +20,9 @@ import hashlib
 import json
 import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -35,128 +39,176 @@ GOLDEN = Path(__file__).with_name("golden.json")
 OUT = ROOT / "runs" / "golden"
 POINTS = 25
 """Largest number of points of a sweep whose decks are rendered."""
+SHORT = {"run.cycles": 24, "run.settling_cycles": 8}
+"""Changes of a case that make its run shorter."""
 RUNS: dict[str, tuple[str, dict[str, Any]]] = {
-    **{
-        name: (name, {})
-        for name in ("fig1b", "fig4a", "fig4b", "symmetric", "climber", "climber-dimer", "cluster")
-    },
+    "fig1b": ("fig1b", {}),
+    "fig4a": ("fig4a", {}),
+    "fig4b": ("fig4b", {}),
+    "symmetric": ("symmetric", {}),
+    "climber": ("climber", {}),
+    "climber-dimer": ("climber-dimer", {}),
+    "cluster": ("cluster", {}),
     "tray": ("tray", {}),
     "pile-ci": ("pile-ci", {}),
-    "slope": ("fig1b", {"boundary.tilt": "20 deg", "run.cycles": 24, "run.settling_cycles": 8}),
+    "slope": ("fig1b", {"boundary.tilt": "20 deg", **SHORT}),
     "groove": (
         "fig1b",
         {"boundary.shape": "groove", "boundary.opening": "120 deg", "dimers.replicates": 2},
     ),
-    "two-tones": (
-        "fig4a",
-        {"drive.waveform": "triangle", "run.cycles": 24, "run.settling_cycles": 8},
-    ),
+    "two-tones": ("fig4a", {"drive.waveform": "triangle", **SHORT}),
 }
+"""Shipped cases that are run, with their changes."""
 
 
-def digest(content: str | bytes) -> str:
-    """A short digest of a text or of bytes."""
-    return hashlib.sha256(content if isinstance(content, bytes) else content.encode()).hexdigest()[
-        :16
-    ]
+def digest(content: bytes) -> str:
+    """A short digest of bytes."""
+    return hashlib.sha256(content).hexdigest()[:16]
 
 
-def _cases(sweep: str) -> Iterator[tuple[str, Case, bool]]:
-    """Name and case of each point, and whether its deck is rendered."""
-    points = load_sweep(sweep)
-    every = max(1, len(points.rows) // POINTS)
-    for number, case in enumerate(points.cases()):
-        yield f"{sweep}/{number}", case, number % every == 0
+def digest_of_text(text: str) -> str:
+    """A short digest of a text."""
+    return digest(text.encode())
 
 
-def _of_deck(case: Case) -> list[str]:
-    """Digests of deck, tables and layout of the first segment and of the whole run."""
-    decks = [render_deck(case), render_deck(case, single_segment(case))]
-    return [
-        digest("".join(deck.text for deck in decks)),
-        digest("".join(f"{name}\n{text}" for deck in decks for name, text in deck.files.items())),
-        digest("".join(json.dumps(deck.layout.as_dict(), sort_keys=True) for deck in decks)),
-    ]
+def digest_of_json(content: Any) -> str:
+    """A short digest of what can be written as JSON."""
+    return digest_of_text(json.dumps(content, sort_keys=True))
 
 
-def of_points(name: str) -> dict[str, list[str]]:
+# --- decks ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Point:
+    """A shipped case, or a point of a shipped sweep."""
+
+    name: str
+    case: Case
+    rendered: bool
+    """Whether its deck is rendered."""
+
+
+def points_of(name: str) -> Iterator[Point]:
+    """The points of a shipped case or sweep."""
+    if name in shipped("case"):
+        yield Point(name, load_case(name), rendered=True)
+        return
+    sweep = load_sweep(name)
+    every = max(1, len(sweep.rows) // POINTS)
+    for number, case in enumerate(sweep.cases()):
+        yield Point(f"{name}/{number}", case, rendered=number % every == 0)
+
+
+def digests_of_deck(case: Case) -> list[str]:
+    """Digests of text, tables and layout of the decks of the first segment and of the whole run."""
+    texts = ""
+    tables = ""
+    layouts = ""
+    for deck in (render_deck(case), render_deck(case, single_segment(case))):
+        texts += deck.text
+        for name, text in deck.files.items():
+            tables += f"{name}\n{text}"
+        layouts += json.dumps(deck.layout.as_dict(), sort_keys=True)
+    return [digest_of_text(texts), digest_of_text(tables), digest_of_text(layouts)]
+
+
+def digests_of_points(name: str) -> dict[str, list[str]]:
     """Digests of the points of a shipped case or sweep."""
-    points = [(name, load_case(name), True)] if name in shipped("case") else _cases(name)
-    return {
-        key: [
-            digest(json.dumps(case.determinants(), sort_keys=True)),
-            *(_of_deck(case) if rendered else []),
-        ]
-        for key, case, rendered in points
-    }
+    digests = {}
+    for point in points_of(name):
+        digests[point.name] = [digest_of_json(point.case.determinants())]
+        if point.rendered:
+            digests[point.name] += digests_of_deck(point.case)
+    return digests
 
 
 def decks() -> dict[str, Any]:
     """Part ``decks``."""
+    digests: dict[str, Any] = {}
     with ProcessPoolExecutor(2) as pool:
-        parts = pool.map(of_points, [*shipped("case"), *shipped("sweep")])
-        return {key: digests for part in parts for key, digests in part.items()}
+        for part in pool.map(digests_of_points, [*shipped("case"), *shipped("sweep")]):
+            digests |= part
+    return digests
+
+
+# --- runs -------------------------------------------------------------------------------------
+
+
+def digest_of_column(column: pd.Series) -> str:
+    """A digest of the bytes of a column, or of the texts of its objects."""
+    values = column.to_numpy()
+    if values.dtype == object:
+        return digest_of_text("\n".join(map(repr, values.tolist())))
+    return digest(values.tobytes())
 
 
 def runs() -> dict[str, Any]:
     """Part ``runs``."""
+    shutil.rmtree(OUT, ignore_errors=True)
     digests: dict[str, Any] = {}
     for name, (case, changes) in RUNS.items():
-        place = run(load_case(case, changes), OUT).directory
-        for path in sorted(place.glob("*.parquet")):
+        directory = run(load_case(case, changes), OUT).directory
+        for path in sorted(directory.glob("*.parquet")):
             table = pd.read_parquet(path)
-            digests |= {
-                f"{name}/{path.stem}/{column}": _of_column(table[column]) for column in table
-            }
-        result = json.loads((place / "result.json").read_text("utf-8"))
-        digests |= {f"{name}/result/{key}": value for key, value in result["numbers"].items()}
+            for column in table:
+                digests[f"{name}/{path.stem}/{column}"] = digest_of_column(table[column])
+        result = json.loads((directory / "result.json").read_text("utf-8"))
+        for key, number in result["numbers"].items():
+            digests[f"{name}/result/{key}"] = number
     return digests
 
 
-def _of_column(column: pd.Series) -> str:
-    values = column.to_numpy()
-    return digest(
-        "\n".join(map(repr, values.tolist())) if values.dtype == object else values.tobytes()
-    )
+# --- the program ------------------------------------------------------------------------------
 
-
-PARTS = {"decks": decks, "runs": runs}
+PARTS: dict[str, Callable[[], dict[str, Any]]] = {"decks": decks, "runs": runs}
 
 
 def differences(golden: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """What differs, a line each."""
-    gone = [f"gone: {key}" for key in golden if key not in now]
-    new = [f"new: {key}" for key in now if key not in golden]
-    changed = [
-        f"{key}: {golden[key]} -> {now[key]}"
-        for key in golden
-        if key in now and golden[key] != now[key]
-    ]
-    return gone + new + changed
+    lines = []
+    for key, value in golden.items():
+        if key not in now:
+            lines.append(f"gone: {key}")
+        elif now[key] != value:
+            lines.append(f"{key}: {value} -> {now[key]}")
+    for key in now:
+        if key not in golden:
+            lines.append(f"new: {key}")
+    return lines
 
 
-def main(action: str, *names: str) -> int:
-    """Freeze or compare."""
-    golden = json.loads(GOLDEN.read_text("utf-8")) if GOLDEN.exists() else {}
-    chosen = names or tuple(PARTS)
-    if "runs" in chosen:
-        shutil.rmtree(OUT, ignore_errors=True)
+def freeze(golden: dict[str, Any], part: str, now: dict[str, Any]) -> None:
+    """Write the numbers of a part anew."""
+    golden[part] = now
+    GOLDEN.write_text(json.dumps(golden, indent=0, sort_keys=True) + "\n", "utf-8")
+    print(f"{part}: {len(now)} values frozen")
+
+
+def compare(golden: dict[str, Any], part: str, now: dict[str, Any]) -> bool:
+    """Print what of a part differs; return whether nothing does."""
+    lines = differences(golden[part], now)
+    if not lines:
+        print(f"{part}: all {len(now)} values are the same")
+        return True
+    print(f"{part}: {len(lines)} of {len(golden[part])} values differ")
+    for line in lines:
+        print(f"  {line}")
+    return False
+
+
+def main(action: str, *parts: str) -> int:
+    """Freeze or compare; the exit status."""
+    golden: dict[str, Any] = {}
+    if GOLDEN.exists():
+        golden = json.loads(GOLDEN.read_text("utf-8"))
     status = 0
-    for name in chosen:
-        now = json.loads(json.dumps(PARTS[name]()))
+    for part in parts or PARTS:
+        now = json.loads(json.dumps(PARTS[part]()))  # as it is read from the file
         if action == "freeze":
-            golden[name] = now
-            GOLDEN.write_text(json.dumps(golden, indent=0, sort_keys=True) + "\n", "utf-8")
-            print(f"{name}: {len(now)} values frozen")
-        elif different := differences(golden[name], now):
+            freeze(golden, part, now)
+        elif not compare(golden, part, now):
             status = 1
-            print(
-                f"{name}: {len(different)} of {len(golden[name])} values differ",
-                *different,
-                sep="\n  ",
-            )
-        else:
-            print(f"{name}: all {len(now)} values are the same")
     return status
 
 
