@@ -1,19 +1,26 @@
-"""Programs and engines that are stopped at any moment: nobody is left behind, and the next call gives the same bits."""
+"""Programs and engines that are stopped at any moment.
+
+Nobody is left behind, and the next call gives the same bits.
+"""
 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import asdict, dataclass
 from ipaddress import ip_address
 from pathlib import Path
-from typing import Any
+from signal import SIGHUP, SIGINT, SIGKILL, SIGTERM
+from typing import Any, Literal
 
 import psutil
 import pytest
+from _pytest.mark import ParameterSet
 
 from tests.cluster import LOCAL
 from tests.conftest import (
@@ -33,6 +40,7 @@ from tests.conftest import (
     wait_for,
 )
 from walkers import run as run_case
+from walkers.files import read_json, write_json
 from walkers.inputs.reading import shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.results import measure, read_results
@@ -43,21 +51,35 @@ from walkers.runner.process import ALONE, off_the_network
 HALTING = """#!/bin/sh
 if [ -n "$HALT" ]; then
     pwd >> "$HALT"/launches
-    mkdir "$HALT"/first 2>/dev/null || sed -i 's/^run .*/timestep 1e-12\\nrun 1999999999/' walker.lig
+    mkdir "$HALT"/first 2>/dev/null ||
+        sed -i 's/^run .*/timestep 1e-12\\nrun 1999999999/' walker.lig
 fi
 exec liggghts "$@"
 """
-"""An engine that does not end, but for the first that starts if there is a folder ``HALT``."""
-SETTLING = {
-    "time_step": "3 us",
-    "longest_settling": "0.02 s",
-    "duration": "0.03 s",
-    "segment": "0.01 s",
-}
+"""An engine; if a folder ``HALT`` is set, only the first of its processes comes to an end."""
+
+
+def _pile() -> dict[str, Any]:
+    """The shipped pile with 14 beads, whose liquid is conserved, so that a restart must keep it."""
+    tables = read_toml(shipped("case")["pile-ci"])
+    tables["liquid"] |= {"conserved": True, "law": "willett"}
+    tables["mixture"] |= {
+        "count": 14,
+        "small": ["0.3 mm", "0.3 mm"],
+        "large": ["0.5 mm", "0.5 mm"],
+    }
+    tables["run"] = {
+        "time_step": "3 us",
+        "longest_settling": "0.02 s",
+        "duration": "0.03 s",
+        "segment": "0.01 s",
+    }
+    return tables
+
+
 FILES: dict[str, dict[str, Any]] = {
     "walker": document(run={**SHORT, "time_step": "2 us", "segment": "25 ms"}),
-    # Restarts must not lose how much liquid each bead has.
-    "pile": {**read_toml(shipped("case")["pile-ci"]), "run": SETTLING},
+    "pile": _pile(),
     "base": document(run=BRIEF),
     # Three decks, each of two points: another division after a stop would give other bits.
     "sweep": {
@@ -68,35 +90,183 @@ FILES: dict[str, dict[str, Any]] = {
         },
     },
 }
-FILES["pile"]["liquid"] |= {"conserved": True, "law": "willett"}
-FILES["pile"]["mixture"] |= {"count": 14, "small": ["0.3 mm"] * 2, "large": ["0.5 mm"] * 2}
-SWEEP, SITE = "sweep sweep.toml -j 2", "sweep sweep.toml --site site.py"
-STOPS: dict[str, tuple[str, int, str, str, int, str]] = {
-    # Command, engines at that time, signals, to whom, exit status, last line.
-    "a run, Ctrl-C": ("run walker.toml", 1, "INT", "program", 130, "interrupted"),
-    "a run, closed terminal under nohup": (
-        "run walker.toml",
-        1,
-        "HUP TERM",
-        "nohup",
-        143,
-        "terminated",
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A program, how it is stopped, and what it then says.
+
+    Attributes
+    ----------
+    command
+        Its arguments.
+    runs
+        The start of the names of the runs that it makes; empty if they are not kept.
+    engines
+        How many engines work when it is stopped.
+    target
+        What is stopped: the program, its group of processes, or an engine; or its output is
+        removed.
+    status
+        Its exit status.
+    signals
+        What is sent, in this order.
+    last_line
+        Words of its last line; empty if a signal ends it before it can say anything.
+    under_nohup
+        Whether ``nohup`` starts it, under which it ignores SIGHUP.
+    """
+
+    command: str
+    runs: str
+    engines: int
+    target: Literal["program", "group", "engine", "output"]
+    status: int
+    signals: tuple[signal.Signals, ...] = ()
+    last_line: str = ""
+    under_nohup: bool = False
+
+    @property
+    def uses_pilots(self) -> bool:
+        """Whether pilot jobs of a site run the engines."""
+        return "--site" in self.command
+
+    @property
+    def can_clean_up(self) -> bool:
+        """Whether the program ends by itself after a signal (130: SIGINT, 143: SIGTERM)."""
+        return self.status in (130, 143)
+
+
+STOPS: dict[str, Stop] = {
+    "a run, Ctrl-C": Stop(
+        command="run walker.toml",
+        runs="walker-",
+        engines=1,
+        target="program",
+        signals=(SIGINT,),
+        status=130,
+        last_line="interrupted",
     ),
-    "a run, engine killed": (
-        "run walker.toml",
-        1,
-        "KILL",
-        "engine",
-        1,
-        "the engine was killed by SIGKILL",
+    "a run, closed terminal under nohup": Stop(
+        command="run walker.toml",
+        runs="walker-",
+        engines=1,
+        target="program",
+        signals=(SIGHUP, SIGTERM),
+        status=143,
+        last_line="terminated",
+        under_nohup=True,
     ),
-    "a check, Ctrl-C": ("check engine --only restart", 1, "INT", "program", 130, "interrupted"),
-    "a pile, killed": ("run pile.toml", 1, "KILL", "program", -9, ""),
-    "a sweep, Ctrl-C": (SWEEP, 2, "INT", "group", 130, "interrupted"),
-    "a sweep, killed": (SWEEP, 2, "KILL", "program", -9, ""),
-    "a sweep, output removed": (SWEEP, 2, "", "output", 1, "was removed while it was written"),
-    "pilots, killed": (SITE, 2, "KILL", "program", -9, ""),
+    "a run, engine killed": Stop(
+        command="run walker.toml",
+        runs="walker-",
+        engines=1,
+        target="engine",
+        signals=(SIGKILL,),
+        status=1,
+        last_line="the engine was killed by SIGKILL",
+    ),
+    "a check, Ctrl-C": Stop(
+        command="check engine --only restart",
+        runs="",
+        engines=1,
+        target="program",
+        signals=(SIGINT,),
+        status=130,
+        last_line="interrupted",
+    ),
+    "a pile, killed": Stop(
+        command="run pile.toml",
+        runs="pile-",
+        engines=1,
+        target="program",
+        signals=(SIGKILL,),
+        status=-SIGKILL,
+    ),
+    "a sweep, Ctrl-C": Stop(
+        command="sweep sweep.toml -j 2",
+        runs="base-",
+        engines=2,
+        target="group",
+        signals=(SIGINT,),
+        status=130,
+        last_line="interrupted",
+    ),
+    "a sweep, killed": Stop(
+        command="sweep sweep.toml -j 2",
+        runs="base-",
+        engines=2,
+        target="program",
+        signals=(SIGKILL,),
+        status=-SIGKILL,
+    ),
+    "a sweep, output removed": Stop(
+        command="sweep sweep.toml -j 2",
+        runs="base-",
+        engines=2,
+        target="output",
+        status=1,
+        last_line="was removed while it was written",
+    ),
+    "pilots, killed": Stop(
+        command="sweep sweep.toml --site site.py",
+        runs="base-",
+        engines=2,
+        target="program",
+        signals=(SIGKILL,),
+        status=-SIGKILL,
+    ),
 }
+
+
+def _stops_that(condition: Callable[[Stop], bool]) -> list[ParameterSet]:
+    """Names of stops as parameters of a test; those of pilots are slow."""
+    parameters = []
+    for name, stop in STOPS.items():
+        if condition(stop):
+            marks = [pytest.mark.slow] if stop.uses_pilots else []
+            parameters.append(pytest.param(name, marks=marks, id=name))
+    return parameters
+
+
+ALL = _stops_that(lambda _: True)
+ON_THIS_MACHINE = _stops_that(lambda stop: not stop.uses_pilots)
+WITH_LAST_LINE = _stops_that(lambda stop: stop.last_line != "")
+CLEANING_UP = _stops_that(lambda stop: stop.can_clean_up)
+KEEPING_RUNS = _stops_that(lambda stop: stop.runs != "")
+KEEPING_DUMPS = _stops_that(lambda stop: stop.runs != "" and stop.target != "output")
+
+
+@dataclass(frozen=True)
+class StoppedProgram:
+    """What is seen of a program before, at and after its stop.
+
+    Attributes
+    ----------
+    children
+        Names of the processes that descend from it while engines work.
+    isolated
+        Whether these engines have the environment `ALONE`.
+    ports
+        Ports that it and its descendants listen on; of pilots, those beyond this machine.
+    finished_dumps
+        Dumps of segments that are complete at the stop, with the time in ns of their last change.
+    status, error_lines
+        Its exit status and what it says.
+    engines_left
+        Engines that work after its end.
+    scratch_left
+        Temporary folders that it leaves.
+    """
+
+    children: list[str]
+    isolated: bool
+    ports: list[str]
+    finished_dumps: dict[str, int]
+    status: int
+    error_lines: list[str]
+    engines_left: list[int]
+    scratch_left: list[str]
 
 
 @pytest.fixture(scope="session")
@@ -115,147 +285,261 @@ def undisturbed(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
     return once("undisturbed", fill)
 
 
-@pytest.fixture
-def stopping(undisturbed: Path, in_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with the files alone, in which engines halt."""
-    for path in undisturbed.iterdir():
-        if path.is_file():
-            shutil.copy(path, in_folder)
-    monkeypatch.setenv("TMPDIR", str(in_folder))
-    monkeypatch.setenv("HALT", str(in_folder))
-    return in_folder
+def _halted_engines(folder: Path, number: int) -> list[int]:
+    """The engines that do not end, once there are ``number`` and the first one has ended."""
+    launches = folder / "launches"
+    if not launches.exists() or len(launches.read_text().split()) != number + 1:
+        return []  # without a look at all processes, which takes long
+    engines = engines_in(folder)
+    return engines if len(engines) == number else []
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(one, marks=[pytest.mark.slow] * ("pilots" in one)) for one in STOPS]
-)
-def test_stopped_and_gone_on(
-    name: str, stopping: Path, undisturbed: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The first engine has ended well by then: its segment or run is kept, and nobody makes it again."""
-    (command, number, signals, whom, status, last), out = STOPS[name], stopping / "runs"
+def _open_ports(stop: Stop, program: psutil.Process, folder: Path) -> list[str]:
+    """Ports that a program or a descendant listens on; of pilots, those beyond this machine."""
+    if stop.uses_pilots:
+        return _reachable(program.pid, folder)
+    ports = []
+    for process in (program, *program.children(recursive=True)):
+        for port in process.net_connections():
+            if port.status == psutil.CONN_LISTEN:
+                ports.append(f"{process.name()} {port.laddr}")
+    return ports
+
+
+def _stop(stop: Stop, program: int, engine: int, out: Path) -> None:
+    """Send the signals of a stop, or remove the output."""
+    if stop.target == "output":
+        shutil.rmtree(out, ignore_errors=True)
+    for number in stop.signals:
+        if stop.target == "group":
+            os.killpg(program, number)
+        elif stop.target == "engine":
+            os.kill(engine, number)
+        else:
+            os.kill(program, number)
+
+
+def _started_and_stopped(stop: Stop, folder: Path) -> StoppedProgram:
+    """Start a program in a folder, and stop it when its first engine alone has ended."""
+    command = [PROGRAM, *stop.command.split(), "--engine", "./engine"]
+    if stop.under_nohup:
+        command.insert(0, "nohup")
     program = subprocess.Popen(
-        [
-            *(["nohup"] if whom == "nohup" else []),
-            PROGRAM,
-            *command.split(),
-            "--engine",
-            "./engine",
-        ],
+        command,
+        cwd=folder,
+        env={**os.environ, "TMPDIR": str(folder), "HALT": str(folder)},
         start_new_session=True,
         stderr=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         text=True,
     )
     try:
-        engines = wait_for(lambda: _halted(stopping, number) or program.poll() is not None)
+        wait_for(lambda: _halted_engines(folder, stop.engines) or program.poll() is not None)
         assert program.poll() is None, program.communicate()
-        if "--site" in command:
-            assert not _reachable(program.pid, stopping)
-        else:
-            _listens_to_nobody(program.pid)
-        if whom == "output":
-            shutil.rmtree(out, ignore_errors=True)
-        kept = {path: path.stat().st_mtime_ns for path in out.glob("*/segments/????/beads.bin")}
-        assert kept or whom == "output" or command.startswith("check")
-        for each in signals.split():
-            send = os.killpg if whom == "group" else os.kill
-            send(engines[0] if whom == "engine" else program.pid, getattr(signal, f"SIG{each}"))
+        process = psutil.Process(program.pid)
+        engines = [psutil.Process(engine) for engine in engines_in(folder)]
+        children = [child.name() for child in process.children(recursive=True)]
+        isolated = all(engine.environ().items() >= ALONE.items() for engine in engines)
+        ports = _open_ports(stop, process, folder)
+        _stop(stop, program.pid, engines[0].pid, folder / "runs")
+        finished_dumps = {}
+        for dump in folder.glob("runs/*/segments/????/beads.bin"):
+            finished_dumps[str(dump.relative_to(folder))] = dump.stat().st_mtime_ns
         _, errors = program.communicate(timeout=PATIENCE)
     finally:
         program.kill()
-    assert (program.returncode, "Traceback" in errors) == (status, False), errors
-    assert last in [*errors.splitlines(), ""][-1 if status < 0 else -2], errors
-    if status in (129, 130, 143):
-        assert not engines_in(stopping)
-        assert not list(stopping.glob("walkers-*"))
-    wait_for(lambda: processes_in(stopping) == [os.getpid()])
-    if command.startswith("check"):
-        return
-    for folder in (*out.glob("*.incomplete"), *out.rglob("*.new")):
-        (folder / "leftover").touch()
-    for part in out.glob("pile*.incomplete"):
-        measure(part)  # nothing of it may stay
-        assert read_results(part)["driven"] == 0.0
-    monkeypatch.delenv("HALT")
-    call(*command.partition(" --site")[0].split(), "--engine", "./engine", check=True)
-    whole = bits(undisturbed / "runs")
-    there = {path: contents for path, contents in whole.items() if (out / path.parts[0]).exists()}
-    assert bits(out) == there
-    assert there
-    for path, written in kept.items():
-        assert Path(str(path).replace(".incomplete", "")).stat().st_mtime_ns == written
-    assert not [path for kind in ("incomplete", "lock", "new") for path in out.rglob(f"*.{kind}")]
-    assert not list(out.rglob("leftover"))
-
-
-def _halted(folder: Path, number: int) -> list[int]:
-    """The engines that do not end, as soon as there are so many and the first has ended."""
-    launches = (folder / "launches").read_text().split() if (folder / "launches").exists() else []
-    engines = (
-        engines_in(folder) if len(launches) == number + 1 else []
-    )  # a look at all processes takes long
-    return engines if len(engines) == number else []
-
-
-def _listens_to_nobody(program: int) -> None:
-    """A program has engines as its only children, without daemons; no port is open."""
-    engines = wait_for(
-        lambda: [one for one in psutil.Process(program).children() if one.name() == "liggghts"]
+    return StoppedProgram(
+        children=children,
+        isolated=isolated,
+        ports=ports,
+        finished_dumps=finished_dumps,
+        status=program.returncode,
+        error_lines=errors.splitlines(),
+        engines_left=engines_in(folder),
+        scratch_left=[path.name for path in folder.glob("walkers-*")],
     )
-    family = [psutil.Process(program), *psutil.Process(program).children(recursive=True)]
-    assert len(family) == len(engines) + 1, family
-    ports = [port for each in family for port in each.net_connections()]
-    assert not [port for port in ports if port.status == psutil.CONN_LISTEN]
-    assert all(each.environ().items() >= ALONE.items() for each in engines)
 
 
-def _reachable(program: int, folder: Path) -> set[str]:
-    """What a program and those that work in a folder listen on that others than this machine may reach."""
-    found = set()
-    for pid in {
-        *processes_in(folder),
-        *(one.pid for one in psutil.Process(program).children(recursive=True)),
-    }:
+@pytest.fixture(scope="session")
+def stopped_folder(
+    undisturbed: Path, once: Callable[[str, Callable[[Path], object]], Path]
+) -> Callable[[str], Path]:
+    """The folder in which the program of a stop has worked, and ``stopped.json`` about it."""
+
+    def made(name: str) -> Path:
+        def fill(folder: Path) -> None:
+            for path in undisturbed.iterdir():
+                if path.is_file():
+                    shutil.copy(path, folder)
+            stopped = _started_and_stopped(STOPS[name], folder)
+            write_json(folder / "stopped.json", asdict(stopped))
+            # However the program ended, its engines and other children end, too.
+            wait_for(lambda: not processes_in(folder))
+
+        return once(re.sub(r"\W+", "-", f"stopped {name}"), fill)
+
+    return made
+
+
+@pytest.fixture(scope="session")
+def stopped(stopped_folder: Callable[[str], Path]) -> Callable[[str], StoppedProgram]:
+    """The program of a stop, by the name of the stop."""
+
+    def read(name: str) -> StoppedProgram:
+        return StoppedProgram(**read_json(stopped_folder(name) / "stopped.json"))
+
+    return read
+
+
+@pytest.fixture(scope="session")
+def resumed(
+    stopped_folder: Callable[[str], Path], once: Callable[[str, Callable[[Path], object]], Path]
+) -> Callable[[str], Path]:
+    """A copy of the folder of a stop in which the same command was given again, to its end."""
+
+    def made(name: str) -> Path:
+        def fill(folder: Path) -> None:
+            shutil.copytree(stopped_folder(name), folder, dirs_exist_ok=True)
+            out = folder / "runs"
+            for unfinished in (*out.glob("*.incomplete"), *out.rglob("*.new")):
+                (unfinished / "leftover").touch()
+            for pile in out.glob("pile*.incomplete"):
+                measure(pile)  # nothing of it may stay
+                assert read_results(pile)["driven"] == 0.0, "stopped while it settled"
+            command = STOPS[name].command.partition(" --site")[0]
+            call(*command.split(), "--engine", "./engine", check=True, folder=folder)
+
+        return once(re.sub(r"\W+", "-", f"resumed {name}"), fill)
+
+    return made
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_program_listens_to_nobody(name: str, stopped: Callable[[str], StoppedProgram]) -> None:
+    """No port is open at all; with pilots, none that other machines reach."""
+    assert stopped(name).ports == []
+
+
+@pytest.mark.parametrize("name", ON_THIS_MACHINE)
+def test_a_program_has_isolated_engines_as_its_only_children(
+    name: str, stopped: Callable[[str], StoppedProgram]
+) -> None:
+    """Daemons of Open MPI would be further children."""
+    assert stopped(name).children == ["liggghts"] * STOPS[name].engines
+    assert stopped(name).isolated
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_program_that_is_stopped_has_the_exit_status_of_the_stop(
+    name: str, stopped: Callable[[str], StoppedProgram]
+) -> None:
+    """128 and the number of a signal that it handles; 1 if a run failed."""
+    assert stopped(name).status == STOPS[name].status
+    assert "Traceback" not in "\n".join(stopped(name).error_lines)
+
+
+@pytest.mark.parametrize("name", WITH_LAST_LINE)
+def test_a_program_that_is_stopped_says_so_in_its_last_line(
+    name: str, stopped: Callable[[str], StoppedProgram]
+) -> None:
+    assert STOPS[name].last_line in stopped(name).error_lines[-1]
+
+
+@pytest.mark.parametrize("name", CLEANING_UP)
+def test_a_program_that_is_stopped_ends_its_engines_and_removes_its_scratch(
+    name: str, stopped: Callable[[str], StoppedProgram]
+) -> None:
+    assert stopped(name).engines_left == []
+    assert stopped(name).scratch_left == []
+
+
+@pytest.mark.parametrize("name", KEEPING_RUNS)
+def test_a_stopped_run_goes_on_to_the_same_bits(
+    name: str, resumed: Callable[[str], Path], undisturbed: Path
+) -> None:
+    expected = {}
+    for path, contents in bits(undisturbed / "runs").items():
+        if path.parts[0].startswith(STOPS[name].runs):
+            expected[path] = contents
+    assert expected
+    assert bits(resumed(name) / "runs") == expected
+
+
+@pytest.mark.parametrize("name", KEEPING_DUMPS)
+def test_segments_that_a_stopped_run_has_completed_are_not_computed_again(
+    name: str, stopped: Callable[[str], StoppedProgram], resumed: Callable[[str], Path]
+) -> None:
+    """The first engine of each has ended well before the stop."""
+    dumps = stopped(name).finished_dumps
+    assert dumps
+    for dump, changed in dumps.items():
+        path = resumed(name) / dump.replace(".incomplete", "")
+        assert path.stat().st_mtime_ns == changed
+
+
+@pytest.mark.parametrize("name", KEEPING_RUNS)
+def test_a_stopped_run_that_went_on_leaves_nothing_beside_it(
+    name: str, resumed: Callable[[str], Path]
+) -> None:
+    for path in (resumed(name) / "runs").rglob("*"):
+        assert path.suffix not in (".incomplete", ".lock", ".new")
+        assert path.name != "leftover"
+
+
+def _is_loopback(ip: str) -> bool:
+    """Whether only this machine reaches an address.
+
+    IPv6 may add a device (``fe80::1%eth0``), and writes IPv4 addresses as ``::ffff:127.0.0.1``.
+    """
+    return ip_address(ip.partition("%")[0].removeprefix("::ffff:")).is_loopback
+
+
+def _ports_beyond_loopback(pid: int) -> list[str]:
+    """Ports that a process listens on and that other machines may reach."""
+    process = psutil.Process(pid)
+    devices = Path(f"/proc/{pid}/net/dev").read_text().splitlines()[2:]
+    if [line.split(":")[0].strip() for line in devices] == ["lo"]:
+        return []  # it has a network of its own, without a device to the outside
+    ports = []
+    for port in process.net_connections("inet"):
+        if port.laddr and not port.raddr and not _is_loopback(port.laddr.ip):
+            ports.append(f"{process.name()} {port.type.name} {port.laddr}")
+    return ports
+
+
+def _reachable(program: int, folder: Path) -> list[str]:
+    """Ports beyond this machine of a program and of all processes that work in a folder."""
+    pids = set(processes_in(folder))
+    pids |= {child.pid for child in psutil.Process(program).children(recursive=True)}
+    ports = []
+    for pid in sorted(pids):
         with suppress(psutil.Error, OSError):  # gone by now
-            process, devices = (
-                psutil.Process(pid),
-                Path(f"/proc/{pid}/net/dev").read_text().splitlines()[2:],
-            )
-            ports = (
-                process.net_connections("inet")
-                if [line.split(":")[0].strip() for line in devices] != ["lo"]
-                else ()
-            )
-            for port in (port for port in ports if port.laddr and not port.raddr):
-                if not ip_address(
-                    port.laddr.ip.partition("%")[0].removeprefix("::ffff:")
-                ).is_loopback:
-                    found.add(f"{process.name()} {port.type.name} {port.laddr}")
-    return found
+            ports += _ports_beyond_loopback(pid)
+    return ports
 
 
 def test_mpirun_and_its_engines_listen_to_nobody_beyond_this_machine(in_folder: Path) -> None:
     if not off_the_network():
         pytest.skip("mpirun listens on every address where nobody may have a network of his own")
-    command = [PROGRAM, "run", "pile-ci", "--set", "run.ranks=2", "--set", "run.duration=100 s"]
-    program, found = (
-        subprocess.Popen(command, start_new_session=True, stderr=subprocess.DEVNULL),
-        set[str](),
+    program = subprocess.Popen(
+        [PROGRAM, "run", "pile-ci", "--set", "run.ranks=2", "--set", "run.duration=100 s"],
+        start_new_session=True,
+        stderr=subprocess.DEVNULL,
     )
+    ports = []
 
-    def looked() -> bool:
-        """Until beads have moved."""
+    def beads_have_moved() -> bool:
+        """Look for ports until then."""
         assert program.poll() is None
-        found.update(_reachable(program.pid, in_folder))
+        ports.extend(_reachable(program.pid, in_folder))
         return any(dump.stat().st_size > 1000 for dump in in_folder.glob("runs/**/beads.bin"))
 
     try:
-        wait_for(looked)
+        wait_for(beads_have_moved)
     finally:
         program.terminate()
         program.wait(timeout=PATIENCE)
-    assert not found
+    assert ports == []
 
 
 def test_an_engine_that_outlives_its_launcher_keeps_others_away(
@@ -263,7 +547,8 @@ def test_an_engine_that_outlives_its_launcher_keeps_others_away(
 ) -> None:
     """The kernel ends an engine whose launcher dies, but not the engine's children."""
     monkeypatch.setattr("walkers.runner.run_directory._PATIENCE_SECONDS", 0.5)
-    case, engine = make_case(run=LONG), front('liggghts "$@"\nexit 0')
+    case = make_case(run=LONG)
+    engine = front('liggghts "$@"\nexit 0')  # the real engine is a child of the shell
     (in_folder / "test.toml").write_text(to_toml(document(run=LONG)))
     program = subprocess.Popen(
         [PROGRAM, "run", "test.toml", "--engine", engine], stderr=subprocess.DEVNULL
