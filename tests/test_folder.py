@@ -45,6 +45,8 @@ from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.removal import removals_in
 from walkers.sweeps.scheduler import SweepOptions, plan_sweep
 
+PATIENCE_OF_LOCKS = "walkers.runner.run_directory._PATIENCE_SECONDS"
+"""How long a lock that another process has is waited for."""
 COMPUTING = "kept: a process is computing it"
 """Why a removal leaves a run or a lock."""
 
@@ -119,13 +121,27 @@ def _listed_runs() -> dict[str, dict[str, Any]]:
     return {row["name"]: row for row in _listed() if row["kind"] == "run"}
 
 
+def _listed_numbers() -> dict[str, object]:
+    """Results of runs and sweeps by name."""
+    numbers = {}
+    for row in _listed():
+        numbers[row["name"]] = row["numbers"]
+    return numbers
+
+
+def _row_with(rows: list[dict[str, Any]], column: str, value: str) -> dict[str, Any]:
+    """The only row that has a value in a column."""
+    (row,) = (row for row in rows if row[column] == value)
+    return row
+
+
 def _size_of(directory: Path) -> int:
     """Bytes of all files of a directory."""
     return sum(path.stat().st_size for path in directory.rglob("*") if path.is_file())
 
 
 def test_a_sweep_is_listed_with_its_axes_and_the_status_of_its_points(out: Path) -> None:
-    (sweep,) = (row for row in _listed() if row["name"] == "three")
+    sweep = _row_with(_listed(), "name", "three")
     assert sweep["varies"] == {
         "contact.friction.bead_wall": 2,
         "drive.frequency": 2,
@@ -152,29 +168,38 @@ def test_a_finished_run_is_listed_with_its_velocity_and_size(out: Path) -> None:
         assert row["size"] == _size_of(directory)
 
 
-def test_unfinished_runs_are_listed_as_failed_interrupted_or_running(
+def test_unfinished_runs_are_listed_as_failed_or_interrupted(
     out: Path, unfinished: Unfinished
 ) -> None:
     rows = _listed_runs()
     failed = rows[_run_name(unfinished.failed)]
     assert (failed["status"], failed["reason"]) == ("failed", "TimeLimitExceeded")
     assert rows[_run_name(unfinished.interrupted)]["status"] == "interrupted"
-    with locked([out / _run_name(unfinished.interrupted)]):  # as a process that computes it does
+
+
+def test_the_run_that_a_process_computes_is_listed_as_running(
+    out: Path, unfinished: Unfinished
+) -> None:
+    """A process has the lock of the run that it computes."""
+    running = _run_name(unfinished.interrupted)
+    with locked([out / running]):
         rows = _listed_runs()
-    assert rows[_run_name(unfinished.interrupted)]["status"] == "running"
-    assert [row["status"] for row in rows.values()].count("running") == 1
+    for name, row in rows.items():
+        assert (row["status"] == "running") == (name == running)
 
 
 def test_listing_reads_neither_dumps_nor_tables(out: Path) -> None:
-    before = {row["name"]: row["numbers"] for row in _listed()}
+    before = _listed_numbers()
     for pattern in ("*.bin", "*.parquet", "*.txt"):
         for path in list(out.rglob(pattern)):
             path.unlink()
-    assert {row["name"]: row["numbers"] for row in _listed()} == before
+    assert _listed_numbers() == before
 
 
 def test_list_tells_the_values_that_differ_between_runs(out: Path) -> None:
-    accelerations = {row["varies"]["drive.peak_acceleration"] for row in _listed_runs().values()}
+    accelerations = set()
+    for row in _listed_runs().values():
+        accelerations.add(row["varies"]["drive.peak_acceleration"])
     assert accelerations == {19.6, 39.2, 58.8}  # 2 g, 4 g and 6 g with g = 9.8 m/s²
 
 
@@ -310,13 +335,15 @@ def test_clean_without_a_terminal_lists_leftovers_and_removes_nothing(
     assert set(total.split(", ")) == {"1 failed run", "1 interrupted run", "1 stale lock"}
     assert refused.returncode == 2
     assert "no terminal" in refused.stderr
-    assert all(path.exists() for path in leftovers)
+    for path in leftovers:
+        assert path.exists()
 
 
 def test_clean_removes_leftovers_alone(out: Path, leftovers: list[Path]) -> None:
     before = finished_places(out)
     call("clean", "--yes", check=True)
-    assert not any(path.exists() for path in leftovers)
+    for path in leftovers:
+        assert not path.exists()
     assert finished_places(out) == before
 
 
@@ -344,12 +371,13 @@ def test_clean_keeps_files_of_users_with_similar_names(out: Path) -> None:
 def test_clean_keeps_runs_that_other_sweeps_have(out: Path) -> None:
     """All runs of the sweeps grid and rough are runs of the sweep three, too."""
     before = finished_places(out)
-    sweeps = [out / "grid", out / "rough"]
-    size = bytes_text(sum(size_and_last_change(sweep)[0] for sweep in sweeps))
+    size_of_grid, _ = size_and_last_change(out / "grid")
+    size_of_rough, _ = size_and_last_change(out / "rough")
     shown = call("clean", "grid", "rough", "--yes", check=True).stdout
-    assert f"2 sweeps to remove, {size}" in shown
+    assert f"2 sweeps to remove, {bytes_text(size_of_grid + size_of_rough)}" in shown
     assert finished_places(out).keys() == before.keys()
-    assert not any(sweep.exists() for sweep in sweeps)
+    assert not (out / "grid").exists()
+    assert not (out / "rough").exists()
 
 
 @pytest.fixture
@@ -385,22 +413,26 @@ def test_clean_removes_with_a_run_its_spread_and_its_accuracy(out: Path, run_of_
 
 @pytest.mark.parametrize(
     "names",
-    [["busy"], ["beads"], ["idle", "busy"]],
+    ["{busy}", "beads", "{idle} {busy}"],
     ids=["the run", "its sweep", "the run and another one"],
 )
-def test_clean_takes_no_named_run_that_a_process_computes(out: Path, names: list[str]) -> None:
+def test_clean_takes_no_named_run_that_a_process_computes(out: Path, names: str) -> None:
     """Nor the sweep that alone has it, nor any other run that is named beside it."""
     places = finished_places(out)
     of_beads_alone = sorted(_names_of_points(out / "beads") - _names_of_points(out / "three"))
     busy, idle = of_beads_alone[:2]
     shutil.rmtree(places[busy])
-    arguments = [{"busy": busy, "idle": idle}.get(name, name) for name in names]
     with locked([out / busy]):
-        ended = call("clean", *arguments, "--yes")
+        ended = call("clean", *names.format(busy=busy, idle=idle).split(), "--yes")
     assert ended.returncode == 2
     assert ended.stderr == f"walkers: {busy}: expected a run that is not in progress\n"
     assert finished_places(out).keys() == places.keys() - {busy}
     assert (out / "beads" / "sweep.json").is_file()
+
+
+def _unfinished_at(out: Path, path: Path) -> list[Removal]:
+    """What `clean` removes at a path."""
+    return [removal for removal in unfinished_in(out) if removal.path == path]
 
 
 def _interrupt_removal(directory: Path, *, keep: str) -> None:
@@ -421,12 +453,15 @@ def test_a_removal_takes_the_manifest_first_and_can_be_repeated(
         remove(removals)
     assert (run / "case.json").is_file()
     assert not (run / MANIFEST_NAME).exists()
-    assert run in [removal.path for removal in unfinished_in(out)]
+    assert len(_unfinished_at(out, run)) == 1
     assert remove(removals) == {}
     assert not run.exists()
 
 
-def test_a_run_that_was_locked_after_the_question_stays(out: Path) -> None:
+def test_a_run_that_was_locked_after_the_question_stays(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(PATIENCE_OF_LOCKS, 0.1)
     run = _first_run(out)
     removals = removals_in(out, [run])
     with locked([run]):
@@ -447,16 +482,12 @@ def test_a_removal_that_is_interrupted_leaves_the_case_until_the_end(
 
     def note_contents(folder: Path) -> None:
         """Stand for the last step of a removal, which removes the folder."""
-        last_names.extend(entry.name for entry in folder.iterdir())
+        for entry in folder.iterdir():
+            last_names.append(entry.name)
 
     monkeypatch.setattr("walkers.runs.removal._remove_directory", note_contents)
     remove(removals)
     assert last_names == ["case.json"]
-
-
-def _unfinished_at(out: Path, path: Path) -> list[Removal]:
-    """What `clean` removes at a path."""
-    return [removal for removal in unfinished_in(out) if removal.path == path]
 
 
 def test_a_replaced_run_is_removed_once_the_new_one_is_there(out: Path) -> None:
@@ -472,7 +503,10 @@ def test_a_replaced_run_is_removed_once_the_new_one_is_there(out: Path) -> None:
     assert not replaced.exists()
 
 
-def test_a_lock_that_a_process_has_taken_since_stays(out: Path) -> None:
+def test_a_lock_that_a_process_has_taken_since_stays(
+    out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(PATIENCE_OF_LOCKS, 0.1)
     lock = out / "gone-0123456789ab.lock"
     lock.touch()
     removals = _unfinished_at(out, lock)
@@ -492,8 +526,9 @@ def _compared(*arguments: str) -> dict[str, Any]:
 
 def test_compare_tells_given_values_before_those_that_follow(out: Path) -> None:
     table = walkers.load(out / "beads").table().set_index(["liquid.name", "dimers.radii[0]"])
-    runs = [table.loc[(liquid, 0.3)]["run"] for liquid in ("Si AK5", "Si AK10")]
-    contents = _compared(*(Path(run).name for run in runs))
+    first = Path(table.loc[("Si AK5", 0.3)]["run"])
+    second = Path(table.loc[("Si AK10", 0.3)]["run"])
+    contents = _compared(first.name, second.name)
     assert list(contents["sources"].items()) == [
         ("liquid.name", ["given", "given"]),
         ("liquid.surface_tension", ["library", "library"]),
@@ -508,7 +543,7 @@ def test_compare_tells_given_values_before_those_that_follow(out: Path) -> None:
 def test_compare_tells_the_velocities_of_two_runs_and_their_scatter(out: Path) -> None:
     first, second = walkers.load(out / "beads").table().to_dict("records")[:2]
     contents = _compared(Path(first["run"]).name, Path(second["run"]).name)
-    (velocity,) = (row for row in contents["results"] if row["quantity"] == "velocity")
+    velocity = _row_with(contents["results"], "quantity", "velocity")
     assert velocity["first"] == first["velocity"]
     assert velocity["second"] == second["velocity"]
     assert velocity["first_scatter"] == first["scatter"]
@@ -619,8 +654,7 @@ def _notes(comparison: Comparison) -> list[str]:
 
 def test_compared_runs_have_the_error_of_their_difference(fast_and_slow: Comparison) -> None:
     """1 mm/s less 1.05 mm/s; independent errors of 3 and 4 µm/s make √(3² + 4²) = 5 µm/s."""
-    results = fast_and_slow.contents["results"]
-    (velocity,) = (row for row in results if row["quantity"] == "velocity")
+    velocity = _row_with(fast_and_slow.contents["results"], "quantity", "velocity")
     assert velocity["difference"] == pytest.approx(-50e-6)
     assert velocity["numerical_error"] == pytest.approx(5e-6)
     assert re.search(
@@ -840,4 +874,4 @@ def test_a_case_file_in_the_folder_of_its_run_survives_the_run(in_folder: Path) 
     for _ in range(2):
         call("run", str(inside), "--force", check=True)
     assert inside.is_file()
-    assert [path.name for path in Path("runs").glob("short-*")] == [run.name]
+    assert list(Path("runs").glob("short-*")) == [run]
