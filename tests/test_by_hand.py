@@ -1,8 +1,13 @@
-"""Decks that are run by hand: what is written, what parameters do that are edited, what is read of what they leave."""
+"""Decks that are run by hand.
+
+What is written, what parameters do that are edited, and what is read of what the engine leaves.
+"""
 
 import re
+import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -11,6 +16,7 @@ import pytest
 
 import walkers
 from tests.conftest import REFERENCE, SHORT, call, document, make_case, wait_for
+from walkers import Run
 from walkers import run as run_case
 from walkers.errors import InputError
 from walkers.inputs.case_building import build_case, changed_case
@@ -20,237 +26,390 @@ from walkers.runner.run_directory import FIRST_SEGMENT
 from walkers.runs.by_hand import take_in, write_folder
 from walkers.runs.case_text import differing, flattened
 
+Once = Callable[[str, Callable[[Path], object]], Path]
 
-def _edit(folder: Path, **values: str) -> None:
+
+def _edit(folder: Path, parameters: dict[str, str]) -> None:
     """Change parameters of a deck."""
     deck = folder / "walker.lig"
     text = deck.read_text()
-    for name, value in values.items():
+    for name, value in parameters.items():
         text, count = re.subn(rf"(?m)^(variable +{name} string) \S+", rf"\g<1> {value}", text)
         assert count == 1, name
     deck.write_text(text)
 
 
-def _run(folder: Path, *, stopped: bool = False) -> None:
-    """Run a deck as its script says, to its end or until it has written frames."""
+def _replace(folder: Path, old: str, new: str) -> None:
+    """Change a command of a deck."""
+    deck = folder / "walker.lig"
+    text = deck.read_text()
+    assert old in text
+    deck.write_text(text.replace(old, new))
+
+
+def _run(folder: Path) -> None:
+    """Run a deck as its script says."""
+    subprocess.run(["sh", "run.sh"], cwd=folder, check=False)
+
+
+def _run_and_kill(folder: Path) -> None:
+    """Run a deck until it has written frames."""
+    beads = folder / "beads.bin"
     engine = subprocess.Popen(["sh", "run.sh"], cwd=folder)
-    if stopped:
-        wait_for(
-            lambda: (
-                (folder / "beads.bin").exists() and (folder / "beads.bin").stat().st_size > 10_000
-            )
-        )
-        engine.kill()
+    wait_for(lambda: beads.exists() and beads.stat().st_size > 10_000)
+    engine.kill()
     engine.wait()
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Of a deck that was not run."""
-    write_folder(make_case(run=SHORT), tmp_path / "hand")
-    return tmp_path / "hand"
+    """The folder of a deck that was not run."""
+    return write_folder(make_case(run=SHORT), tmp_path / "hand").parent
 
 
-def test_a_deck_run_by_hand_is_read_and_says_so(
-    folder: Path, run_directory: Callable[..., Path]
-) -> None:
+@pytest.fixture(scope="session")
+def deck_after_its_run(once: Once) -> Path:
+    """The folder of a deck that was run by hand, and that granular-walkers has not read."""
+
+    def fill(folder: Path) -> None:
+        write_folder(make_case(run=SHORT), folder / "hand")
+        _run(folder / "hand")
+
+    return once("run-by-hand", fill) / "hand"
+
+
+@pytest.fixture
+def finished(deck_after_its_run: Path, tmp_path: Path) -> Path:
+    """A copy of the folder of a deck that was run by hand, to be read and changed."""
+    return Path(shutil.copytree(deck_after_its_run, tmp_path / "hand"))
+
+
+def test_a_deck_that_was_not_run_is_refused_with_the_command(folder: Path) -> None:
     with pytest.raises(InputError, match=r"the deck was not run .*; do: cd .* && sh run\.sh"):
         run_case(folder)
-    _run(folder)
-    found, same = run_case(folder), run_case(run_directory(run=SHORT))
-    assert found.result.about["by_hand"] == ["run by hand"]
-    assert {**found.result, "by_hand": 0} == {**same.result, "by_hand": 0}
-    assert (folder / "beads.bin").read_bytes() == (
-        same.directory / FIRST_SEGMENT / "beads.bin"
-    ).read_bytes()
-    assert ("warning: run by hand" in found.describe(), "(already run)" in found.describe()) == (
-        True,
-        False,
-    )
-    assert found.case.document == make_case(run=SHORT).document
-    for command in ("run", "plot", "export --to vtk", "check files"):
-        assert call(*command.split(), str(folder)).returncode == 0, command
-    written = (folder / "result.json").stat().st_mtime_ns
-    run_case(folder)
-    assert (folder / "result.json").stat().st_mtime_ns == written
 
 
+def test_a_deck_run_by_hand_has_the_dump_of_the_program(
+    finished: Path, run_directory: Callable[..., Path]
+) -> None:
+    dump = run_directory(run=SHORT) / FIRST_SEGMENT / "beads.bin"
+    assert (finished / "beads.bin").read_bytes() == dump.read_bytes()
+
+
+def test_a_deck_run_by_hand_has_the_result_of_the_program(
+    finished: Path, run_directory: Callable[..., Path]
+) -> None:
+    by_hand = run_case(finished)
+    by_program = run_case(run_directory(run=SHORT))
+    assert {**by_hand.result, "by_hand": 0} == {**by_program.result, "by_hand": 0}
+    assert by_hand.case.document == make_case(run=SHORT).document
+
+
+def test_a_deck_run_by_hand_says_so(finished: Path) -> None:
+    run = run_case(finished)
+    assert run.result.about["by_hand"] == ["run by hand"]
+    assert "warning: run by hand" in run.describe()
+    assert "(already run)" not in run.describe()
+
+
+@pytest.mark.parametrize("command", ["run", "plot", "export --to vtk", "check files"])
+def test_a_deck_run_by_hand_is_a_run_for_commands(finished: Path, command: str) -> None:
+    run_case(finished)
+    assert call(*command.split(), str(finished)).returncode == 0
+
+
+def test_a_deck_run_by_hand_is_measured_once(finished: Path) -> None:
+    run_case(finished)
+    written = (finished / "result.json").stat().st_mtime_ns
+    run_case(finished)
+    assert (finished / "result.json").stat().st_mtime_ns == written
+
+
+@dataclass(frozen=True)
+class Edit:
+    """Parameters of a deck that are edited, and what the case is by then.
+
+    Attributes
+    ----------
+    parameters
+        Parameters of the deck with their new values.
+    changes
+        The same as changes of the case.
+    tables
+        Tables of the case whose deck is edited, beside those of the reference.
+    """
+
+    parameters: dict[str, str]
+    changes: dict[str, Any]
+    tables: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def original(self) -> Case:
+        """The case of the deck as it was written."""
+        return build_case({**document(run=SHORT), **self.tables}, name="test")
+
+    @property
+    def expected(self) -> Case:
+        """The case of the edited deck."""
+        tables = changed(CaseFile, {**document(run=SHORT), **self.tables}, self.changes)
+        return build_case(tables, name="test")
+
+
+RAMP = {**REFERENCE["drive"], "ramp": [["0.01 s", 0.5], ["0.06 s", 1.25]]}
 TONES = [
     {"frequency": "80 Hz", "peak_acceleration": "2 g"},
     {"axis": "y", "frequency": "160 Hz", "peak_acceleration": "1 g", "phase": "90 deg"},
 ]
 PEAK = changed_case(make_case(), {"drive.gamma0": 0.4}).drive.peak_acceleration
+"""Of Γ0 = 0.4 with beads of the density as it was, in m/s²."""
 LIQUID = {
     "volume_fraction": 0.01,
     "contact_angle": "0 deg",
     "surface_tension": "20 mN/m",
     "density": "1 g/cm^3",
+    "kinematic_viscosity": "5 mm^2/s",
+    "viscosity_ratio": 2.0,
 }
-EDITED: dict[str, tuple[dict[str, Any], dict[str, str], dict[str, Any]]] = {
-    # Tables of a case, edits of its deck, the same changes of the case.
-    "amplitude": (
-        {},
-        {"amplitude": "1.16e-4"},
-        {"drive.peak_acceleration": f"{1.16e-4 * (160.0 * pi) ** 2!r} m/s^2"},
+EDITS: dict[str, Edit] = {
+    # A ω² with A = 0.116 mm and ω = 2π · 80 Hz.
+    "amplitude": Edit(
+        parameters={"amplitude": "1.16e-4"},
+        changes={"drive.peak_acceleration": f"{1.16e-4 * (160.0 * pi) ** 2!r} m/s^2"},
     ),
-    "frictions": (
-        {},
-        {"friction_bead_wall": "0.2", "restitution": "0.5"},
-        {"contact.friction.bead_wall": 0.2, "contact.restitution": 0.5},
+    "frictions": Edit(
+        parameters={"friction_bead_wall": "0.2", "restitution": "0.5"},
+        changes={"contact.friction.bead_wall": 0.2, "contact.restitution": 0.5},
     ),
-    "length": ({}, {"cycles": "9"}, {"run.cycles": 9, "run.settling_cycles": 3}),
-    "frequency of a ramp": (
-        {"drive": {**REFERENCE["drive"], "ramp": [["0.01 s", 0.5], ["0.06 s", 1.25]]}},
-        {"frequency": "70.0"},
-        {"drive.frequency": "70 Hz"},
+    # A third of the cycles settles, as before.
+    "length": Edit(
+        parameters={"cycles": "9"},
+        changes={"run.cycles": 9, "run.settling_cycles": 3},
     ),
-    "two tones and their cycle": (
-        {"drive": {"harmonics": TONES}},
-        {"frequency_1": "60.0", "frequency_2": "120.0", "cycle_frequency": "60.0"},
-        {"drive.harmonics[0].frequency": "60 Hz", "drive.harmonics[1].frequency": "120 Hz"},
+    "frequency of a ramp": Edit(
+        tables={"drive": RAMP},
+        parameters={"frequency": "70.0"},
+        changes={"drive.frequency": "70 Hz"},
     ),
-    "Γ0 with another density": (
-        {"drive": {"frequency": "80 Hz", "gamma0": 0.4}},
-        {"density": "4200.0"},
-        {"beads.density": "4.2 g/cm^3", "drive.peak_acceleration": f"{PEAK!r} m/s^2"},
+    "two tones and their cycle": Edit(
+        tables={"drive": {"harmonics": TONES}},
+        parameters={"frequency_1": "60.0", "frequency_2": "120.0", "cycle_frequency": "60.0"},
+        changes={
+            "drive.harmonics[0].frequency": "60 Hz",
+            "drive.harmonics[1].frequency": "120 Hz",
+        },
     ),
-    "a kinematic viscosity": (
-        {"liquid": {**LIQUID, "kinematic_viscosity": "5 mm^2/s", "viscosity_ratio": 2.0}},
-        {"viscosity": "0.004"},
-        {"liquid.dynamic_viscosity": "4 mPa*s", "liquid.viscosity_ratio": 1.0},
+    # The deck has the acceleration, which an edited density does not change, but Γ0.
+    "Γ0 with another density": Edit(
+        tables={"drive": {"frequency": "80 Hz", "gamma0": 0.4}},
+        parameters={"density": "4200.0"},
+        changes={"beads.density": "4.2 g/cm^3", "drive.peak_acceleration": f"{PEAK!r} m/s^2"},
     ),
-    "a time step beyond the limits": (
-        {"run": {**SHORT, "time_step": "2 us"}},
-        {"steps_per_cycle": "2000"},
-        {"run.time_step": "6.25 us", "run.allow_unstable": True},
+    # The deck has the viscosity of bridges, which is that of the liquid times the ratio.
+    "a kinematic viscosity": Edit(
+        tables={"liquid": LIQUID},
+        parameters={"viscosity": "0.004"},
+        changes={"liquid.dynamic_viscosity": "4 mPa*s", "liquid.viscosity_ratio": 1.0},
     ),
-    "an uncertain value": (
-        {"uncertain": {"contact.restitution": [0.2, 0.4]}},
-        {"restitution": "0.5"},
-        {"contact.restitution": 0.5, "uncertain": {}},
+    # 1 / (80 Hz · 2000) = 6.25 µs.
+    "a time step beyond the limits": Edit(
+        tables={"run": {**SHORT, "time_step": "2 us"}},
+        parameters={"steps_per_cycle": "2000"},
+        changes={"run.time_step": "6.25 us", "run.allow_unstable": True},
+    ),
+    "an uncertain value": Edit(
+        tables={"uncertain": {"contact.restitution": [0.2, 0.4]}},
+        parameters={"restitution": "0.5"},
+        changes={"contact.restitution": 0.5, "uncertain": {}},
     ),
 }
+SAME_START = ["amplitude", "frictions", "length", "frequency of a ramp"]
+"""Edits after which walkers start, and the engine steps, as in the case with these values."""
 
 
-def _numbers(case: Case) -> list[float]:
-    """What parameters of a deck determine; the last four are those of the run's length and samples."""
-    liquid, contact, run, sines = (
-        case.liquid.of_bridges,
-        case.contact,
-        case.run,
-        case.excitation.harmonics,
-    )
+def _physical_numbers(case: Case) -> list[float]:
+    """What parameters of a deck determine, but for the length of the run."""
+    liquid = case.liquid.of_bridges
     numbers = [
-        number
-        for one in sines
-        for number in (*one.direction, one.frequency, one.peak_acceleration, one.phase)
-    ]
-    numbers += [
         case.beads.density,
         case.environment.gravity,
         liquid.surface_tension,
         liquid.viscosity,
-        run.period,
+        case.run.period,
+        case.contact.friction.bead_bead,
+        case.contact.friction.bead_wall,
+        case.contact.restitution,
+        case.contact.youngs_modulus,
     ]
-    numbers += [
-        contact.friction.bead_bead,
-        contact.friction.bead_wall,
-        contact.restitution,
-        contact.youngs_modulus,
-    ]
-    return [*numbers, run.cycles, run.settling_cycles, run.samples_per_cycle, run.cycles_per_sample]
+    for sine in case.excitation.harmonics:
+        numbers += [*sine.direction, sine.frequency, sine.peak_acceleration, sine.phase]
+    return numbers
 
 
-@pytest.mark.parametrize("name", EDITED)
-def test_an_edited_deck_is_another_case(
-    name: str, tmp_path: Path, run_directory: Callable[..., Path]
+def _length_of_run(case: Case) -> list[int]:
+    """Cycles and samples of a run."""
+    run = case.run
+    return [run.cycles, run.settling_cycles, run.samples_per_cycle, run.cycles_per_sample]
+
+
+@pytest.fixture(scope="session")
+def edited_run(once: Once) -> Callable[[str], Run]:
+    """Runs of edited decks, by the name of the edit."""
+
+    def made(name: str) -> Run:
+        edit = EDITS[name]
+
+        def fill(folder: Path) -> None:
+            hand = write_folder(edit.original, folder / "hand").parent
+            _edit(hand, edit.parameters)
+            _run(hand)
+            run_case(hand)
+
+        return run_case(once(f"edited-{list(EDITS).index(name)}", fill) / "hand")
+
+    return made
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_an_edited_deck_is_another_case(name: str, edited_run: Callable[[str], Run]) -> None:
+    case = edited_run(name).case
+    expected = EDITS[name].expected
+    assert _physical_numbers(case) == pytest.approx(_physical_numbers(expected), rel=1e-9)
+    assert _length_of_run(case) == _length_of_run(expected)
+    assert case.drive.ramp == expected.drive.ramp
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_an_edited_deck_has_the_steps_per_cycle_that_it_says(
+    name: str, edited_run: Callable[[str], Run]
 ) -> None:
-    tables, edits, changes = EDITED[name]
-    case, expected = (
-        build_case(changed(CaseFile, {**document(run=SHORT), **tables}, more), name="test")
-        for more in ({}, changes)
-    )
-    folder = write_folder(case, tmp_path / "hand").parent
-    _edit(folder, **edits)
-    _run(folder)
-    found = run_case(folder)
-    assert _numbers(found.case) == pytest.approx(_numbers(expected), rel=1e-9)
-    assert found.case.run.steps_per_cycle == int(
-        edits.get("steps_per_cycle", case.run.steps_per_cycle)
-    )
-    assert [one.spacing for one in found.case.walkers] == [one.spacing for one in case.walkers]
-    assert found.case.drive.ramp == expected.drive.ramp
-    # Its tables are those of a case file.
-    assert _numbers(changed_case(found.case, {"title": "again"}))[:-4] == pytest.approx(
-        _numbers(expected)[:-4], rel=1e-9
-    )
-    _, told, *_ = found.result.about["by_hand"]
-    assert all(re.search(rf"[ :]{parameter} \S+, was [\d.e-]+", told) for parameter in edits)
-    assert told.count(", was ") == len(edits)
-    if not tables or expected.drive.ramp:
-        # Where the walker stands at first, its time step and how a ramp is rounded are those of the case as it was.
-        same = run_case(run_directory(expected))
-        assert found.result["velocity"] == pytest.approx(same.result["velocity"], rel=1e-2)
-        # What commands list: the edits, which are given, and nothing else.
-        (left, _), (right, _) = (
-            differing([*map(flattened, (case, other))]) for other in (found.case, expected)
-        )
-        assert {*left} - {"run.settling_cycles"} == {*right} - {"run.settling_cycles"}
+    """Unless they are edited, those of the deck as it was written."""
+    steps = EDITS[name].original.run.steps_per_cycle
+    if name == "a time step beyond the limits":
+        steps = 2000
+    assert edited_run(name).case.run.steps_per_cycle == steps
 
 
-def test_a_deck_that_is_edited_and_run_again_is_read_again(folder: Path) -> None:
-    _run(folder)
-    first = run_case(folder).result["velocity"]
-    _edit(folder, peak_acceleration="20.0")
-    deck = folder / "walker.lig"
-    deck.write_text(
-        deck.read_text()
-        .replace("nve/sphere", "nve/sphere  # as ever")
-        .replace("delay 0", "delay 1")
-    )
-    _run(folder)
-    again = run_case(folder)
-    assert again.result["velocity"] < first
-    assert "peak_acceleration 20, was 39.2; 1 other line(s)" in again.result.about["by_hand"][1]
-    assert " finished: edited and run by hand " in call("list", "--out", str(folder.parent)).stdout
-    _edit(folder, restitution="0.5")
-    assert "walker.lig is newer than" in run_case(folder).result.about["by_hand"][-1]
+@pytest.mark.parametrize("name", EDITS)
+def test_walkers_of_an_edited_deck_start_where_they_stood(
+    name: str, edited_run: Callable[[str], Run]
+) -> None:
+    """Their spacing depends on the drive, but no parameter moves them."""
+    spacings = [kind.spacing for kind in edited_run(name).case.walkers]
+    assert spacings == [kind.spacing for kind in EDITS[name].original.walkers]
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_the_case_of_an_edited_deck_can_be_changed(
+    name: str, edited_run: Callable[[str], Run]
+) -> None:
+    """Its tables are those of a case file."""
+    again = changed_case(edited_run(name).case, {"title": "again"})
+    expected = _physical_numbers(EDITS[name].expected)
+    assert _physical_numbers(again) == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", EDITS)
+def test_the_result_of_an_edited_deck_names_the_edits(
+    name: str, edited_run: Callable[[str], Run]
+) -> None:
+    parameters = EDITS[name].parameters
+    edits = edited_run(name).result.about["by_hand"][1]
+    for parameter in parameters:
+        assert re.search(rf"[ :]{parameter} \S+, was [\d.e-]+", edits)
+    assert edits.count(", was ") == len(parameters)
+
+
+@pytest.mark.parametrize("name", SAME_START)
+def test_an_edited_deck_has_the_velocity_of_its_case(
+    name: str, edited_run: Callable[[str], Run], run_directory: Callable[..., Path]
+) -> None:
+    """Within 1 %: the walker starts, and a ramp is rounded, as in the case as it was."""
+    expected = run_case(run_directory(EDITS[name].expected)).result["velocity"]
+    assert edited_run(name).result["velocity"] == pytest.approx(expected, rel=1e-2)
+
+
+def _given_keys(case: Case, original: Case) -> set[str]:
+    """Keys of given values that differ between two cases; the settling follows the length."""
+    keys, _ = differing([flattened(case), flattened(original)])
+    return set(keys) - {"run.settling_cycles"}
+
+
+@pytest.mark.parametrize("name", SAME_START)
+def test_the_case_of_an_edited_deck_gives_the_edits_alone(
+    name: str, edited_run: Callable[[str], Run]
+) -> None:
+    """Commands list what differs from the case as it was."""
+    edit = EDITS[name]
+    keys = _given_keys(edited_run(name).case, edit.original)
+    assert keys == _given_keys(edit.expected, edit.original)
+
+
+def test_a_deck_that_is_edited_and_run_again_is_read_again(finished: Path) -> None:
+    """At 20 m/s² instead of 39.2 m/s² (4 g) the walker is slower. A comment is no edit."""
+    first = run_case(finished).result["velocity"]
+    _edit(finished, {"peak_acceleration": "20.0"})
+    _replace(finished, "nve/sphere", "nve/sphere  # as ever")
+    _replace(finished, "delay 0", "delay 1")
+    _run(finished)
+    again = run_case(finished).result
+    assert again["velocity"] < first
+    assert "peak_acceleration 20, was 39.2; 1 other line(s)" in again.about["by_hand"][1]
+    listed = call("list", "--out", str(finished.parent)).stdout
+    assert " finished: edited and run by hand " in listed
+
+
+def test_a_deck_that_is_edited_after_its_run_is_told(finished: Path) -> None:
+    run_case(finished)
+    _edit(finished, {"restitution": "0.5"})
+    assert "walker.lig is newer than" in run_case(finished).result.about["by_hand"][-1]
+
+
+def test_a_deck_run_by_hand_is_not_taken_for_a_run_with_other_values(finished: Path) -> None:
+    run_case(finished)
     with pytest.raises(InputError, match=r"no finished run in .*--set 'drive.frequency=70 Hz'"):
-        walkers.load(folder, changes={"drive.frequency": "70 Hz"})
+        walkers.load(finished, changes={"drive.frequency": "70 Hz"})
 
 
-FAILS: dict[str, tuple[dict[str, str], str, str]] = {
-    # Edits of parameters, a wrong command instead of pair_coeff, what is said.
-    "an error of the engine": ({}, "pair_coeff * * 3", "failed: the engine stopped: ERROR"),
-    "steps that are no cycle": (
-        {"time_step": "3e-6"},
-        "",
-        "not one cycle of 80 Hz .*edit steps_per_cycle",
-    ),
-    "a word for a number": ({"restitution": "high"}, "", "cannot be read .*'high'"),
-    "a value that no case has": (
-        {"youngs_modulus": "2e6"},
-        "",
-        r"the edited deck: contact\.youngs_modulus = \"2",
-    ),
-    "a run that was stopped": (
-        {"cycles": "4000", "peak_acceleration": "1.0"},
-        "",
-        "still runs or was stopped",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", FAILS)
-def test_a_run_by_hand_that_cannot_be_read_is_told_in_one_message(name: str, folder: Path) -> None:
-    edits, command, told = FAILS[name]
-    _edit(folder, **edits)
-    deck = folder / "walker.lig"
-    deck.write_text(
-        deck.read_text().replace("pair_coeff      * *", command or "pair_coeff      * *")
-    )
-    _run(folder, stopped=name == "a run that was stopped")
-    with pytest.raises(InputError, match=told) as caught:
+def _assert_refused(folder: Path, message: str) -> None:
+    """A deck is refused in one line, and is no finished run."""
+    with pytest.raises(InputError, match=message) as caught:
         take_in(folder)
     assert len(str(caught.value).splitlines()) == 1
     assert not (folder / "manifest.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        pytest.param(
+            {"time_step": "3e-6"},
+            "not one cycle of 80 Hz .*edit steps_per_cycle",
+            id="steps that are no cycle",
+        ),
+        pytest.param({"restitution": "high"}, "cannot be read .*'high'", id="a word for a number"),
+        pytest.param(
+            {"youngs_modulus": "2e6"},
+            r"the edited deck: contact\.youngs_modulus = \"2",
+            id="a value that no case has",
+        ),
+    ],
+)
+def test_a_parameter_that_no_case_can_have_is_refused(
+    parameters: dict[str, str], message: str, folder: Path
+) -> None:
+    _edit(folder, parameters)
+    _run(folder)
+    _assert_refused(folder, message)
+
+
+def test_an_error_of_the_engine_in_a_run_by_hand_is_told(folder: Path) -> None:
+    """A command of the deck has an argument too many."""
+    _replace(folder, "pair_coeff      * *", "pair_coeff * * 3")
+    _run(folder)
+    _assert_refused(folder, "failed: the engine stopped: ERROR")
+
+
+def test_a_run_by_hand_that_was_stopped_is_told(folder: Path) -> None:
+    _edit(folder, {"cycles": "4000", "peak_acceleration": "1.0"})
+    _run_and_kill(folder)
+    _assert_refused(folder, "still runs or was stopped")
