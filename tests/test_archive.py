@@ -642,10 +642,18 @@ def _edited_deck(folder: Path) -> Path:
     return directory
 
 
-def _sweep(folder: Path) -> Path:
-    """A sweep whose points share a deck."""
+def _two_decks(folder: Path) -> Path:
+    """A sweep of two points, each of which has its deck, because there are two workers."""
     _write_sweep(folder)
-    return walkers.sweep(folder / "angles.toml", folder / "runs").directory
+    call("sweep", "angles.toml", "-j", "2", check=True, folder=folder)
+    return folder / "runs" / "angles"
+
+
+def _shared_deck(folder: Path) -> Path:
+    """A sweep whose points share a deck, because there is one worker."""
+    _write_sweep(folder)
+    call("sweep", "angles.toml", "-j", "1", check=True, folder=folder)
+    return folder / "runs" / "angles"
 
 
 MAKERS = {
@@ -653,7 +661,8 @@ MAKERS = {
     "a long run": _long_run,
     "two MPI processes": _parallel_run,
     "an edited deck": _edited_deck,
-    "a sweep": _sweep,
+    "a sweep of two decks": _two_decks,
+    "a sweep of a shared deck": _shared_deck,
 }
 
 
@@ -728,7 +737,12 @@ def _deck_by_hand(folder: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    "kind", ["a short run", pytest.param("an edited deck", marks=pytest.mark.slow)]
+    "kind",
+    [
+        "a short run",
+        pytest.param("an edited deck", marks=pytest.mark.slow),
+        pytest.param("a sweep of two decks", marks=pytest.mark.slow),
+    ],
 )
 def test_commands_of_a_readme_repeat_a_run_with_liggghts_alone(
     kind: str, followed_with_liggghts: Callable[[str], Path]
@@ -747,7 +761,7 @@ def test_commands_of_a_readme_repeat_a_shared_deck_with_liggghts_alone(
     followed_with_liggghts: Callable[[str], Path],
 ) -> None:
     """Its dump has the beads of all points, and no run of the archive has such a dump."""
-    folder = followed_with_liggghts("a sweep")
+    folder = followed_with_liggghts("a sweep of a shared deck")
     printed = (folder / "printed.txt").read_text()
     assert "written    shared_deck/beads.bin (nothing to compare with)" in printed
     assert _deck_by_hand(folder).name == "shared_deck"
@@ -758,7 +772,8 @@ def test_commands_of_a_readme_repeat_a_shared_deck_with_liggghts_alone(
     [
         "a short run",
         pytest.param("an edited deck", marks=pytest.mark.slow),
-        pytest.param("a sweep", marks=pytest.mark.slow),
+        pytest.param("a sweep of two decks", marks=pytest.mark.slow),
+        pytest.param("a sweep of a shared deck", marks=pytest.mark.slow),
     ],
 )
 def test_commands_of_a_readme_repeat_a_run_with_the_program(
