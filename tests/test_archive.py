@@ -479,7 +479,7 @@ def _path_in(unpacked: Path, name: str) -> Path:
         (SUMS, b"what it is not", 2, "expected a checksum and a path"),
     ],
 )
-def test_a_file_that_was_written_into_an_unpacked_archive_is_told(
+def test_a_file_that_was_written_into_an_unpacked_archive_is_reported(
     unpacked: Path, name: str, contents: bytes, status: int, message: str
 ) -> None:
     _path_in(unpacked, name).write_bytes(contents)
@@ -494,7 +494,7 @@ def test_a_file_that_was_written_into_an_unpacked_archive_is_told(
         (SUMS, 2, f"or an archive ({SUMS})"),
     ],
 )
-def test_a_file_that_an_unpacked_archive_has_lost_is_told(
+def test_a_file_that_an_unpacked_archive_has_lost_is_reported(
     unpacked: Path, name: str, status: int, message: str
 ) -> None:
     _path_in(unpacked, name).unlink()

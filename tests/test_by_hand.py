@@ -358,7 +358,7 @@ def test_a_deck_that_is_edited_and_run_again_is_read_again(finished: Path) -> No
     assert " finished: edited and run by hand " in listed
 
 
-def test_a_deck_that_is_edited_after_its_run_is_told(finished: Path) -> None:
+def test_a_deck_that_is_edited_after_its_run_is_reported(finished: Path) -> None:
     run_case(finished)
     _edit(finished, {"restitution": "0.5"})
     assert "walker.lig is newer than" in run_case(finished).result.about["by_hand"][-1]
@@ -402,14 +402,14 @@ def test_a_parameter_that_no_case_can_have_is_refused(
     _assert_refused(folder, message)
 
 
-def test_an_error_of_the_engine_in_a_run_by_hand_is_told(folder: Path) -> None:
+def test_an_error_of_the_engine_in_a_run_by_hand_is_reported(folder: Path) -> None:
     """A command of the deck has an argument too many."""
     _replace(folder, "pair_coeff      * *", "pair_coeff * * 3")
     _run(folder)
     _assert_refused(folder, "failed: the engine stopped: ERROR")
 
 
-def test_a_run_by_hand_that_was_stopped_is_told(folder: Path) -> None:
+def test_a_run_by_hand_that_was_stopped_is_reported(folder: Path) -> None:
     _edit(folder, {"cycles": "4000", "peak_acceleration": "1.0"})
     _run_and_kill(folder)
     _assert_refused(folder, "still runs or was stopped")

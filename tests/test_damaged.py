@@ -21,7 +21,6 @@ from typing import Any, NoReturn
 
 import numpy as np
 import pytest
-from _pytest.mark import ParameterSet
 
 import walkers
 from tests.conftest import (
@@ -219,7 +218,7 @@ DAMAGES: dict[str, Damage] = {
 }
 
 
-def _damages_and_their_readers() -> list[ParameterSet]:
+def _damages_and_their_readers() -> list[Any]:
     """Each damage with each command that reads what is damaged."""
     parameters = []
     for name, damage in DAMAGES.items():
@@ -239,7 +238,7 @@ def _contents(folder: Path) -> dict[Path, bytes]:
 
 
 @pytest.mark.parametrize(("damage", "command"), _damages_and_their_readers())
-def test_a_damaged_run_is_told_in_a_line_by_all_that_read_what_is_damaged(
+def test_a_damaged_run_is_reported_in_a_line_by_all_that_read_what_is_damaged(
     damage: Damage, command: str, parts: Path
 ) -> None:
     """And nothing on disk is lost."""
@@ -718,7 +717,7 @@ def finished_sweep(in_folder: Path, once: Once) -> Path:
         ("list runs/sweep --to {disk}/g.csv", 2),
     ],
 )
-def test_a_full_disk_is_told_in_a_line_and_nothing_half_written_stays(
+def test_a_full_disk_is_reported_in_a_line_and_nothing_half_written_stays(
     command: str, status: int, finished_sweep: Path, tmp_path: Path
 ) -> None:
     with mounted(tmp_path / "disk", "256k") as disk:

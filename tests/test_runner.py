@@ -462,7 +462,7 @@ def bin_without_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pat
     return folder
 
 
-def test_a_missing_compiler_is_told_with_the_packages_to_install(
+def test_a_missing_compiler_is_reported_with_the_packages_to_install(
     bin_without_compiler: Path,
 ) -> None:
     packages = r"apt-get install g\+\+ libliggghts-dev libopenmpi-dev"
@@ -470,7 +470,7 @@ def test_a_missing_compiler_is_told_with_the_packages_to_install(
         plugin_of(find_engine())
 
 
-def test_a_contact_model_that_cannot_be_compiled_is_told(
+def test_a_contact_model_that_cannot_be_compiled_is_reported(
     bin_without_compiler: Path, tmp_path: Path
 ) -> None:
     """In the words of the compiler; nothing stays in the cache."""
@@ -856,7 +856,7 @@ STRANGE_ENGINES = {
 
 
 @pytest.mark.parametrize("name", STRANGE_ENGINES)
-def test_strange_engines_are_ended_and_told(front: Front, tmp_path: Path, name: str) -> None:
+def test_strange_engines_are_ended_and_reported(front: Front, tmp_path: Path, name: str) -> None:
     strange = STRANGE_ENGINES[name]
     with pytest.raises(strange.failure, match=strange.message) as caught:
         _launch(
@@ -925,7 +925,7 @@ def test_an_engine_that_never_started_is_tried_twice_again(front: Front, tmp_pat
     assert starts.read_text() == "start\n" * 3
 
 
-def test_an_engine_that_never_started_three_times_is_told(front: Front, tmp_path: Path) -> None:
+def test_an_engine_that_never_started_three_times_is_reported(front: Front, tmp_path: Path) -> None:
     starts = tmp_path / "starts"
     engine = _engine_that_fails_to_start(front, 99, starts)
     with pytest.raises(EngineNeverStarted, match="never started: exit status"):

@@ -20,7 +20,6 @@ from typing import Any, Literal
 
 import psutil
 import pytest
-from _pytest.mark import ParameterSet
 
 from tests.cluster import LOCAL
 from tests.conftest import (
@@ -219,7 +218,7 @@ STOPS: dict[str, Stop] = {
 }
 
 
-def _stops_that(condition: Callable[[Stop], bool]) -> list[ParameterSet]:
+def _stops_that(condition: Callable[[Stop], bool]) -> list[Any]:
     """Names of stops as parameters of a test; those of pilots are slow."""
     parameters = []
     for name, stop in STOPS.items():
