@@ -36,35 +36,61 @@ def _holds(node: ast.AST, kinds: tuple[type[ast.AST], ...]) -> bool:
     return any(isinstance(child, kinds) for child in ast.walk(node) if child is not node)
 
 
+def _in_comprehension(node: ast.AST) -> Iterator[str]:
+    match node:
+        case ast.ListComp() | ast.SetComp() | ast.DictComp() | ast.GeneratorExp():
+            yield "comprehension"
+            if len(node.generators) > 1 or _holds(node, COMPREHENSIONS):
+                yield "nested comprehension"
+
+
+def _in_conditional_expression(node: ast.AST) -> Iterator[str]:
+    if isinstance(node, ast.IfExp):
+        yield "conditional expression"
+        if _holds(node, (ast.IfExp,)):
+            yield "nested conditional expression"
+
+
+def _in_assignment(node: ast.AST) -> Iterator[str]:
+    match node:
+        case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Tuple()):
+            yield "assignment of a tuple"
+            if len(names) > 3:
+                yield "assignment of more than three values"
+        case ast.Assign(targets=[ast.Name(id="_")]):
+            yield "assignment to nothing"
+
+
+def _in_display(node: ast.AST) -> Iterator[str]:
+    unpacked: list[ast.expr] = []
+    match node:
+        case ast.Dict(keys=keys, values=values):
+            unpacked = [value for key, value in zip(keys, values, strict=True) if key is None]
+        case ast.List(elts=items) | ast.Tuple(elts=items) | ast.Set(elts=items):
+            unpacked = [item.value for item in items if isinstance(item, ast.Starred)]
+    if any(isinstance(value, DISPLAYS) for value in unpacked):
+        yield "display that is unpacked in a display"
+
+
+def _in_product(node: ast.AST) -> Iterator[str]:
+    match node:
+        case ast.BinOp(op=ast.Mult(), left=left, right=right):
+            if _is_condition(left) or _is_condition(right):
+                yield "product with a condition"
+
+
 def _constructs(tree: ast.AST) -> Iterator[tuple[str, ast.AST]]:
-    """What packs code, with the name of the construct."""
+    """What packs code: the name of the construct, and where it stands."""
     for node in ast.walk(tree):
-        match node:
-            case ast.ListComp() | ast.SetComp() | ast.DictComp() | ast.GeneratorExp():
-                yield "comprehension", node
-                if len(node.generators) > 1 or _holds(node, COMPREHENSIONS):
-                    yield "nested comprehension", node
-            case ast.IfExp():
-                yield "conditional expression", node
-                if _holds(node, (ast.IfExp,)):
-                    yield "nested conditional expression", node
-            case ast.Assign(targets=[ast.Tuple(elts=names)], value=ast.Tuple()):
-                yield "assignment of a tuple", node
-                if len(names) > 3:
-                    yield "assignment of more than three values", node
-            case ast.Assign(targets=[ast.Name(id="_")]):
-                yield "assignment to nothing", node
-            case ast.Dict(keys=keys, values=values):
-                for key, value in zip(keys, values, strict=True):
-                    if key is None and isinstance(value, DISPLAYS):
-                        yield "display that is unpacked in a display", value
-            case ast.List(elts=items) | ast.Tuple(elts=items) | ast.Set(elts=items):
-                for item in items:
-                    if isinstance(item, ast.Starred) and isinstance(item.value, DISPLAYS):
-                        yield "display that is unpacked in a display", item
-            case ast.BinOp(op=ast.Mult(), left=left, right=right):
-                if _is_condition(left) or _is_condition(right):
-                    yield "product with a condition", node
+        for names in (
+            _in_comprehension(node),
+            _in_conditional_expression(node),
+            _in_assignment(node),
+            _in_display(node),
+            _in_product(node),
+        ):
+            for name in names:
+                yield name, node
 
 
 COUNTED = set(LIMITS)
@@ -106,9 +132,12 @@ def test_what_packs_code_is_recognised(line: str, construct: str) -> None:
     assert construct in [name for name, _ in _constructs(ast.parse(line))]
 
 
+MODULES = [*_files("walkers"), *_files("studies"), *_files("docs"), *_files("tests")]
+
+
 @pytest.mark.parametrize(
     "path",
-    [path for folder in ("walkers", "studies", "docs", "tests") for path in _files(folder)],
+    MODULES,
     ids=lambda path: path.relative_to(ROOT).as_posix(),
 )
 def test_a_line_holds_one_thought(path: Path) -> None:
