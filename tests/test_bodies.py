@@ -84,7 +84,7 @@ def case_of_tables(*clusters: dict[str, Any], **tables: Any) -> Case:
 
 def make_fig1b(**changes: Any) -> Case:
     """The shipped case of Fig. 1b with a single walker, which walks for 20 cycles."""
-    start = {"dimers.facing": "right"}
+    start: dict[str, Any] = {"dimers.facing": "right"}
     for key, value in STRAIGHT_START.items():
         start[f"dimers.{key}"] = value
     return load_case("fig1b", {**start, "run.cycles": 20, "run.settling_cycles": 8, **changes})
