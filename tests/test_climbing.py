@@ -385,7 +385,7 @@ def test_runs_of_different_lengths_tell_the_probability_of_the_distribution(
 ) -> None:
     """1 - exp(-3/2) by 3 s, half after 2 ln 2 s.
 
-    The share of all runs would be less: it takes those that ended for such that do not climb.
+    The share of runs with a climb is smaller, for it counts runs that ended before as runs without.
     """
     expected = 1.0 - np.exp(-3.0 / 2.0)
     assert of_many["probability"] == pytest.approx(expected, abs=0.06)
@@ -551,7 +551,7 @@ def test_the_chance_of_as_many_large_leaders_is_printed(summary: dict[str, Any])
 
 
 def test_no_chance_is_printed_that_the_draws_cannot_tell(summary: dict[str, Any]) -> None:
-    """At least two of the 10,000 draws."""
+    """10,000 draws do not resolve a probability below 2/10,000."""
     assert printed(summary, p_among_beads=1e-4)["p by chance"] == "0.0002"
 
 
@@ -748,25 +748,25 @@ def test_a_sweep_of_piles_has_chances(runs_of_starts: Path) -> None:
 
 
 @pytest.fixture
-def both(starts: walkers.Sweep, runs_of_starts: Path) -> tuple[str, ...]:
+def command(starts: walkers.Sweep, runs_of_starts: Path) -> tuple[str, ...]:
     """Arguments of the program: the sweep, and the first of its runs by itself."""
     return ("climb", "starts", str(starts.runs[0].directory), "--out", str(runs_of_starts))
 
 
 def test_a_sweep_of_piles_and_a_run_by_itself_are_printed_as_two_conditions(
-    both: tuple[str, ...],
+    command: tuple[str, ...],
 ) -> None:
-    printed = call(*both, check=True).stdout
+    printed = call(*command, check=True).stdout
     assert printed.count("0 of 2\n") == 1
     assert printed.count("0 of 1\n") == 1
 
 
 def test_a_sweep_of_piles_and_a_run_by_itself_are_two_conditions_of_a_table(
-    both: tuple[str, ...], starts: walkers.Sweep, tmp_path: Path
+    command: tuple[str, ...], starts: walkers.Sweep, tmp_path: Path
 ) -> None:
     """The first three rows are those of the sweep; the runs last for less than a second."""
     table = tmp_path / "climbs.csv"
-    done = call(*both, "--to", str(table), "--within", "1s", check=True)
+    done = call(*command, "--to", str(table), "--within", "1s", check=True)
     assert "warning" not in done.stderr
     written = pd.read_csv(table)
     run = starts.runs[0].directory.name
@@ -776,20 +776,20 @@ def test_a_sweep_of_piles_and_a_run_by_itself_are_two_conditions_of_a_table(
 
 
 def test_the_climbs_of_a_sweep_of_piles_are_drawn_without_a_warning(
-    both: tuple[str, ...], tmp_path: Path
+    command: tuple[str, ...], tmp_path: Path
 ) -> None:
     """Such as one of a layout that failed."""
     figure = tmp_path / "climbs.svg"
-    done = call(*both, "--to", str(figure), "--within", "10ms", check=True)
+    done = call(*command, "--to", str(figure), "--within", "10ms", check=True)
     assert "share that has climbed" in figure.read_text()
     assert "warning" not in done.stderr
 
 
 def test_the_climbs_of_a_sweep_of_piles_rest_on_the_frictions_that_were_guessed(
-    both: tuple[str, ...],
+    command: tuple[str, ...],
 ) -> None:
     """A line for each of the two conditions."""
-    lines = call(*both, check=True).stdout.splitlines()
+    lines = call(*command, check=True).stdout.splitlines()
     guessed = [line for line in lines if line.startswith("guessed")]
     assert len(guessed) == 2
     for line in guessed:

@@ -154,7 +154,7 @@ def make_scene(
         height[:, LEADER : TAIL + 1] += rise
     floor = floor_of(names)
     bulks = []
-    held = []
+    free_clusters = []
     for frame in range(FRAMES):
         bridges = make_bridges(
             [*pairwise(BULK), *joined(frame), *pairs(frame)],
@@ -163,9 +163,9 @@ def make_scene(
         labels = connected(BEADS, bridges.beads)
         bulk = bulk_of(labels, bridges, floor=floor)
         bulks.append(bulk)
-        held.append(list(clusters.held_clusters(labels, bridges, bulk, floor)))
+        free_clusters.append(list(clusters.held_clusters(labels, bridges, bulk, floor)))
     beads = PileBeads(TIME, height, np.arange(BEADS) == LEADER, np.zeros(FRAMES), bulks, 0, names)
-    tracks = clusters.follow(TIME, held)
+    tracks = clusters.follow(TIME, free_clusters)
     return Scene(beads, tracks, climbs_of(tracks, beads))
 
 
@@ -652,7 +652,7 @@ CYLINDER = {"boundary.shape": "cylinder", "boundary.width": "6 mm"}
 def test_a_climb_is_in_a_corner_if_two_walls_hold_it(
     case: str, changes: dict[str, Any], walls: dict[int, int], where: str
 ) -> None:
-    """Two beads lead a cluster; each case names the wall to which one or both have bridges."""
+    """Each case maps beads of the cluster to the walls to which they have bridges."""
 
     def at_walls(frame: int) -> dict[int, int]:
         return walls

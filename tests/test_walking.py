@@ -893,7 +893,7 @@ def test_the_mean_of_many_samples_is_near_the_mean_of_all_steps(many_samples: Gr
 def test_the_mean_of_few_samples_is_not_the_mean_of_all_steps(
     few_samples: Group, many_samples: Group
 ) -> None:
-    """Otherwise the tests above could not tell the two."""
+    """Otherwise the tests of means could not tell one from the other."""
     error = np.abs(mean_of_samples(few_samples) - averages(many_samples).sliding).max()
     assert error > 5e-3 * largest_sliding(many_samples)
 
