@@ -87,7 +87,7 @@ def progress_of(name: str, shown: bool | None = True) -> Iterator[Tell | None]:
 
 
 def _show_in_place(name: str, stream: TextIO, width: int) -> Tell:
-    """A function that writes the progress over the line before, in so many letters."""
+    """A function that writes the progress over the line before, in a line of ``width`` letters."""
 
     def show(progress: Progress) -> None:
         bar = "━" * round(_BAR_LETTERS * progress.share)

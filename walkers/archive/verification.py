@@ -111,17 +111,17 @@ def verify(path: Path) -> list[Verification]:
 def _verify_sweep(directory: Path) -> list[Verification]:
     """One verification of the points of a sweep, and one of each finished run."""
     record = read_sweep_record(directory)
-    runs = []
+    directories = []
     missing = []
     for number, (run, state) in enumerate(zip(record.runs, states(record), strict=True)):
         if state.status != "finished":
             missing.append(f"{run} ({state.status}: point {number})")
-        elif state.directory is not None:
-            runs.append(state.directory)
-    summary = f"{len(runs)} points have a run"
+        elif state.directory is not None:  # which a finished point always has
+            directories.append(state.directory)
+    summary = f"{len(directories)} points have a run"
     points = Verification(record.sweep.name, summary, {Finding.MISSING: missing})
     # Several points may have the same run.
-    verified_runs = [_verify_run(run) for run in dict.fromkeys(runs)]
+    verified_runs = [_verify_run(directory) for directory in dict.fromkeys(directories)]
     return [points, *verified_runs]
 
 

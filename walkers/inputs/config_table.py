@@ -273,7 +273,8 @@ class ConfigTable(BaseModel):
         choice
             The keys of which the table has one expression.
         given
-            The keys that the file gives, and their values. "auto" counts as not given.
+            The keys that the file gives, and their values. A key with "auto" begins no expression,
+            but is not missing either.
         place
             The dotted key of the table; empty for the whole file.
         """

@@ -67,6 +67,8 @@ _POSITIVE = np.array([0, 1, 3])
 """Places of the positive numbers of a bridge: both arcs and the length."""
 _NEWTON_STEPS = 30
 """Largest number of steps of Newton's method."""
+_LARGEST_CHANGE = 0.3
+"""Largest relative change of arcs and length in a step."""
 _CONVERGED = 1e-12
 """Relative size of the last of these steps."""
 _ARC_STEP = 0.05
@@ -386,11 +388,23 @@ class _Family:
         return pi * (2.0 * solids.r_sin_phi - x[:, 2:3] * solids.radii**2)[:, 0]
 
     def solve(self, x: FloatArray, row: FloatArray, values: FloatArray) -> FloatArray:
-        """Solve for n bridges with row · x = value by Newton's method.
+        """Solve the equations of n bridges and row · x = value by Newton's method.
 
-        The method starts from n bridges x, shape (n, 5), as that of the solutions.
+        The equations are those of `misfit`.
 
-        Bridges are NaN where the method fails.
+        Parameters
+        ----------
+        x
+            Bridges from which the method starts, shape (n, 5).
+        row
+            Coefficients of the fifth equation, shape (5,).
+        values
+            Its right sides, shape (n,).
+
+        Returns
+        -------
+        numpy.ndarray
+            The bridges, shape (n, 5); NaN where the method fails.
         """
         solved = np.full_like(x, nan)
         unsolved = np.arange(len(x))
@@ -400,7 +414,8 @@ class _Family:
             matrices = np.concatenate([jacobian, np.tile(row, (len(x), 1, 1))], axis=1)
             step = solve_linear(matrices, misfit)
             change = np.abs(step[:, _POSITIVE] / x[:, _POSITIVE]).max(axis=1)
-            x = x - step * np.minimum(1.0, 0.3 / (change + 1e-300))[:, None]
+            # A long step is shortened, so that arcs and lengths remain positive.
+            x = x - step * np.minimum(1.0, _LARGEST_CHANGE / (change + 1e-300))[:, None]
             sound = (x[:, _POSITIVE] > 0.0).all(axis=1)
             tolerance = _CONVERGED * np.maximum(1.0, np.abs(x).max(axis=1))
             converged = sound & (np.abs(step).max(axis=1) < tolerance)

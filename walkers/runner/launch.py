@@ -276,7 +276,7 @@ class _Watch:
         Time of the last loop over steps, s; NaN before its end.
     bytes_read
         Number of bytes of the log that were read.
-    bytes_written
+    bytes_of_output
         Number of bytes of log and dump at the last look.
     looked
         When the last look was, s of the performance counter.
@@ -302,7 +302,7 @@ class _Watch:
         self.unfinished_line = b""
         self.loop_seconds = math.nan
         self.bytes_read = 0
-        self.bytes_written = 0
+        self.bytes_of_output = 0
         self.looked = self.started
         self.silent_seconds = 0.0
 
@@ -355,7 +355,10 @@ class _Watch:
     # --- reading ----------------------------------------------------------------------------------
 
     def look(self) -> None:
-        """Read the output since the last look, up to the limit of the log, and measure silence."""
+        """Read the output since the last look, and measure for how long there was none.
+
+        Reading stops as soon as the limit of the log is passed, which `check` reports.
+        """
         with open_regular(self.log) as output:
             output.seek(self.bytes_read)
             while self.bytes_read <= self.deck.log_limit:
@@ -365,15 +368,16 @@ class _Watch:
                 self.bytes_read += len(chunk)
                 lines, newline, rest = (self.unfinished_line + chunk).rpartition(b"\n")
                 self._take_in(lines + newline)
-                self.unfinished_line = rest[:_CHUNK_BYTES]  # a line may have no end
+                # A line that does not end must not fill the memory.
+                self.unfinished_line = rest[:_CHUNK_BYTES]
         now = time.perf_counter()
-        bytes_written = self.bytes_read + self.dump_bytes
-        if bytes_written != self.bytes_written:
+        bytes_of_output = self.bytes_read + self.dump_bytes
+        if bytes_of_output != self.bytes_of_output:
             self.silent_seconds = 0.0
         else:
             self.silent_seconds += min(now - self.looked, _LONGEST_LOOK)
         self.looked = now
-        self.bytes_written = bytes_written
+        self.bytes_of_output = bytes_of_output
 
     def _take_in(self, lines: bytes) -> None:
         """Keep from lines of the log what is needed later."""

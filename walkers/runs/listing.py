@@ -331,7 +331,8 @@ class RunsOfCase:
     runs
         Its runs.
     keys
-        Keys in which the runs differ, without those that follow from others.
+        Keys in which the runs differ. Those that follow from others are left out, unless the runs
+        differ only in them.
     """
 
     case: str

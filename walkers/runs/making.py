@@ -234,6 +234,9 @@ def progress_in(
 ) -> Progress:
     """Progress of a run within a segment.
 
+    A run until constant velocities is tried with growing numbers of cycles; a segment belongs to
+    one of these attempts. Shares and times count the steps of all attempts since the drive began.
+
     Parameters
     ----------
     run
@@ -241,15 +244,15 @@ def progress_in(
     cycles
         Number of cycles of the current attempt.
     segment
-        The segment; its end does not matter.
+        The segment; its ``drive_from`` is None while the beads come to rest.
     step
         The step that the engine has reached.
     seconds
         Wall time since the start of the segment, s. In the first second the speed is not told.
     """
     step = max(step, segment.begin)
-    steps_of_earlier_attempts = run.steps_until(cycles - 1)
-    steps = run.steps_until(run.cycles)
+    steps_of_earlier_attempts = run.steps_of_attempts(cycles - 1)
+    steps = run.steps_of_attempts(run.cycles)
     done = steps_of_earlier_attempts
     if segment.drive_from is not None:
         done += step - segment.drive_from

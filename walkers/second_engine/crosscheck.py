@@ -181,9 +181,11 @@ def divergence_lines(first: Motion, second: Motion) -> Iterator[Line]:
     case = first.case
     distance = np.linalg.norm(first.position - second.position, axis=-1).max(axis=1)
     diverged = np.flatnonzero(distance > SAME_MOTION * float(first.radius.min()))
-    last_common_frame = diverged[0] if len(diverged) else -1
+    last_frame = len(distance) - 1
+    end_of_same_motion = diverged[0] if len(diverged) else last_frame
+    # Times count from the start of the drive.
     frequency = case.excitation.frequency
-    common_cycles = float(frequency * first.time[last_common_frame])
+    common_cycles = float(frequency * first.time[end_of_same_motion])
     cycles = float(frequency * first.time[-1])
     prefix = ""
     decided = None

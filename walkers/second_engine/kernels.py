@@ -256,7 +256,7 @@ def bridge_forces(
 ) -> tuple[float, float, float, float, float]:
     """Capillary force and resistances of a bridge at a gap (m).
 
-    Those of overlaps are as at contact.
+    The gap must be below the rupture of the bridge. An overlap (a negative gap) counts as contact.
 
     Returns
     -------
@@ -269,15 +269,15 @@ def bridge_forces(
     gap = max(gap, 0.0)
     if gap < scale:
         piece = 0
-        share = gap / scale
+        place_in_piece = gap / scale
     elif gap < middle:
         piece = 1
-        share = log(gap / scale) / log(middle / scale)
+        place_in_piece = log(gap / scale) / log(middle / scale)
     else:
         piece = 2
-        share = 1.0 - sqrt((rupture - gap) / (rupture - middle))
-    cell = min(int(share * CELLS), CELLS - 1)
-    t = share * CELLS - cell
+        place_in_piece = 1.0 - sqrt((rupture - gap) / (rupture - middle))
+    cell = min(int(place_in_piece * CELLS), CELLS - 1)
+    t = place_in_piece * CELLS - cell  # place in the cell, 0 to 1
     coefficients = bridges.splines[bridge, piece, cell]
     values = ((coefficients[0] * t + coefficients[1]) * t + coefficients[2]) * t + coefficients[3]
     return values[0], values[1], values[2], values[3], values[4]

@@ -219,9 +219,10 @@ def _ranked(panels: list[_Panel], finished: pd.DataFrame, column: str) -> tuple[
     ranks = rank_correlations(finished, column, list(finished.attrs["sampled"]))
     if ranks is None:
         return panels, f"{len(finished)} draws: too few for rank correlations"
+    # Keys on which the column does not depend significantly have no rank correlation.
     titled = []
     for panel in panels:
-        key = panel.x.keys[0]
+        key = panel.x.keys[0]  # the only one: each sampled key has a panel
         title = f"rank correlation {ranks[key]:+.2f}" if key in ranks else "no clear dependence"
         titled.append(replace(panel, title=title))
     titled.sort(key=lambda panel: -abs(ranks.get(panel.x.keys[0], 0.0)))

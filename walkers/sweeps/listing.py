@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -97,18 +97,21 @@ def without_members(contents: Sequence[ListEntry]) -> list[ListEntry]:
 
 
 def as_json(contents: Sequence[ListEntry]) -> list[dict[str, Any]]:
-    """Entries as JSON objects, SI units.
+    """Entries as JSON objects, in SI units.
 
-    ``varies`` of a sweep has the number of values of each key, that of a run the values by which
-    the runs of its case differ.
+    They have ``varies`` instead of ``parameters``: for a sweep the number of values of each varied
+    key, for a run its values of the keys in which the runs of its case differ.
     """
     keys_by_case = {group.case: group.keys for group in by_case(_of_kind("run", contents))}
     rows = []
     for entry in contents:
-        varied = entry.parameters if entry.kind == "sweep" else keys_by_case[entry.case]
+        if entry.kind == "sweep":
+            keys: Iterable[str] = entry.parameters
+        else:
+            keys = keys_by_case[entry.case]
         row = vars(entry) | {"directory": str(entry.directory)}
         del row["parameters"]
-        row["varies"] = {key: entry.parameters.get(key) for key in varied}
+        row["varies"] = {key: entry.parameters.get(key) for key in keys}
         rows.append(row)
     return rows
 

@@ -507,7 +507,10 @@ class _SweepLoop:
         self.decks[future] = deck
 
     def _handle(self, deck: PlannedDeck, outcome: DeckOutcome) -> None:
-        """Count the points of a deck that has ended, and submit again those that are left."""
+        """Count the points of a deck that has ended, and submit again those that are left.
+
+        The outcome is the failure of the deck, or the names of the runs that are finished now.
+        """
         if isinstance(outcome, Failure):
             self._handle_failure(deck, outcome)
             return

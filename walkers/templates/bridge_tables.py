@@ -163,17 +163,27 @@ def tabulated(law: BridgeLaw, surfaces: Surfaces, tolerance: float = TOLERANCE) 
     )
 
 
+_LEAST_REFERENCE = 1e-3
+"""Smallest force to which errors are relative, over the force at contact."""
+
+
 def _error(table: BridgeTable) -> tuple[float, float]:
-    """The largest relative error of the engine's interpolation between rows, and its gap (m)."""
+    """The largest relative error of the engine's interpolation between rows, and its gap (m).
+
+    Errors are relative to the forces nearby, because forces fall by orders of magnitude, some to
+    zero; but not to less than `_LEAST_REFERENCE` of the force at contact.
+    """
+    # Cells have rows at their ends and thirds. Errors are largest in between.
     gaps = table.within(np.array([1.0 / 6.0, 0.5, 5.0 / 6.0]))
     exact = columns_at(table.curve, gaps)
     error = np.abs(table.interpolated(gaps) - exact)
-    # Errors are relative to forces nearby: forces fall by orders of magnitude, some to zero.
     at_half_gap = np.abs(exact[np.searchsorted(gaps, 0.5 * gaps)])
-    size = np.maximum(np.maximum(at_half_gap, np.abs(exact)), 1e-3 * np.abs(table.rows[:1]))
-    relative = np.divide(error, size, out=np.zeros_like(error), where=size > 0.0).max(axis=1)
-    worst = int(relative.argmax())
-    return float(relative[worst]), float(gaps[worst])
+    nearby = np.maximum(at_half_gap, np.abs(exact))
+    reference = np.maximum(nearby, _LEAST_REFERENCE * np.abs(table.rows[:1]))
+    relative = np.divide(error, reference, out=np.zeros_like(error), where=reference > 0.0)
+    largest = relative.max(axis=1)
+    worst = int(largest.argmax())
+    return float(largest[worst]), float(gaps[worst])
 
 
 def bridge_tables(

@@ -64,7 +64,7 @@ class _Column:
 
     Attributes
     ----------
-    number
+    index
         Its place in a row of the file.
     place
         Its place in a row of the record: 0 for the time, 1 to 3 for x, y and z.
@@ -74,7 +74,7 @@ class _Column:
         Its name and unit in the header.
     """
 
-    number: int
+    index: int
     place: int
     factor: float
     head: str
@@ -259,12 +259,29 @@ def _check_length(fields: Sequence[str], number: int, heads: Sequence[str], sepa
 
 
 def _row_of(fields: Sequence[str], number: int, columns: Sequence[_Column]) -> list[float]:
-    """A row of the record, of the row of the file with a number."""
+    """The row of the record (time in s, accelerations in m/s²) that a row of the file gives.
+
+    Axes that the file does not have are 0.
+
+    Parameters
+    ----------
+    fields
+        Texts of the row of the file.
+    number
+        Number of the row in the file, for messages.
+    columns
+        The columns that are read.
+
+    Raises
+    ------
+    ValueError
+        If a field is not a finite number.
+    """
     row = [0.0, 0.0, 0.0, 0.0]
     for column in columns:
         text = ""
-        if column.number < len(fields):
-            text = fields[column.number].strip()
+        if column.index < len(fields):
+            text = fields[column.index].strip()
         value = _number_of(text)
         if not isfinite(value):
             problem = f'row {number}: column "{column.head}" is "{text[:_LONGEST_QUOTATION]}"'
@@ -288,7 +305,7 @@ def _check_decimal_commas(rows: Sequence[Sequence[str]], columns: Sequence[_Colu
     with_point = ""
     for row in rows:
         for column in columns:
-            text = row[column.number]
+            text = row[column.index]
             if not with_comma and "," in text:
                 with_comma = text.strip()
             if not with_point and "." in text:

@@ -327,9 +327,11 @@ class Case(Setup):
         return self.model_dump(mode="json")
 
     def for_cycles(self, cycles: int) -> Case:
-        """The case with a fixed number of cycles in one segment, instead of an upper limit.
+        """The case with a fixed number of cycles, instead of cycles until velocities are constant.
 
-        A case whose number of cycles is fixed already is returned as it is.
+        A run until constant velocities is tried with growing numbers of cycles, each time from the
+        start and in one part; this is the case of one such attempt. A case whose number of cycles
+        is fixed already is returned as it is.
         """
         if not self.run.until_steady:
             return self

@@ -88,10 +88,15 @@ class Liquid(LiquidTable):
 
     @cached_property
     def of_bridges(self) -> BridgeLiquid:
-        """The properties of the liquid on which the forces of bridges depend, in SI units."""
+        """The properties of the liquid on which the forces of bridges depend, in SI units.
+
+        Either the volume fraction or the radius of the menisci is given; the other is 0.
+        """
+        viscosity = self.dynamic_viscosity * self.viscosity_ratio
         return BridgeLiquid(
             surface_tension=self.surface_tension,
-            viscosity=float(f"{self.dynamic_viscosity * self.viscosity_ratio:.15g}"),
+            # Rounded so that equal liquids have equal bridges, however their viscosity was given.
+            viscosity=float(f"{viscosity:.15g}"),
             volume_fraction=self.volume_fraction or 0.0,
             meniscus_radius=self.meniscus_radius or 0.0,
             contact_angle=self.contact_angle,

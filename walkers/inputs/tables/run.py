@@ -187,8 +187,8 @@ class RunSettings(RunTable):
         most = self.cycles
         return f"walkers run continues to {most} if {condition}: then set cycles to {most}"
 
-    def steps_until(self, cycles: int) -> int:
-        """Steps of all attempts up to the one with a number of cycles."""
+    def steps_of_attempts(self, cycles: int) -> int:
+        """Number of steps of all attempts with at most a number of cycles."""
         return self.steps_per_cycle * sum(attempt for attempt in self.attempts if attempt <= cycles)
 
     @property

@@ -55,7 +55,10 @@ _FEWEST_BEADS = 2
 _FEWEST_FRAMES = 3
 """Smallest number of frames of the rise of a climb."""
 _CORNER_COSINE = 0.7072
-"""Cosine of 45°, the smallest angle between the normals of two walls that form a corner."""
+"""Cosine of the smallest angle between the normals of two walls that form a corner.
+
+It is slightly above the cosine of 45°, so that 45° counts in spite of rounding.
+"""
 _MOST_BLOCKS = 10
 """Largest number of parts of a climb for the standard error of its speed."""
 _FEWEST_BLOCKS = 4
@@ -314,7 +317,7 @@ def _left_bulk(track: Track, beads: PileBeads) -> bool:
 
 
 def _walls_apart(walls: Sequence[int], frame: int, members: Sequence[int], beads: PileBeads) -> int:
-    """Number of walls at a cluster whose normals differ by 45° or more; two in a corner.
+    """Number of walls at a cluster whose normals differ by 45° or more; in a corner it is 2.
 
     A round vessel of a mesh has many faces: a cluster that touches two of them is not in a corner.
     """

@@ -154,6 +154,7 @@ def measure(directory: Path) -> None:
     numbers["truncated"] = motion.truncated
     tables: dict[str, Columns] = {}
     versions: dict[str, int] = {}
+    # Only decks that were run by hand have notes; they have a single segment.
     segment = read_json(segment_directories(directory)[-1] / SEGMENT_NAME)
     notes = segment.get("by_hand") or []
     warnings = list(notes)
@@ -178,7 +179,7 @@ def measure(directory: Path) -> None:
     }
     files = [f"{name}.parquet" for name in tables]
     files.append(RESULT_NAME)
-    with recomputed(directory, files):
+    with recomputed(directory, files):  # also notes their new checksums
         for name, columns in tables.items():
             write_table(directory, name, columns)
         write_json(directory / RESULT_NAME, contents)
@@ -256,7 +257,8 @@ def recorded(directory: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        The numbers as ``numbers``, NaN if one is not defined, and the other entries of the file.
+        The numbers as ``numbers``, NaN if one is not defined, and the other entries of the file
+        except the versions of the measuring modules.
 
     Raises
     ------
@@ -269,13 +271,13 @@ def recorded(directory: Path) -> dict[str, Any]:
         version = contents.pop("version")
         versions_of_modules = contents.pop("modules", None)
         if versions_of_modules is not None:
-            versions_of_modules = dict(versions_of_modules)
+            versions_of_modules = dict(versions_of_modules)  # raises an error for a damaged entry
         _check_names(contents, _ENTRIES)
         numbers = {}
         for name, number in contents["numbers"].items():
             numbers[name] = nan if number is None else number
         contents["numbers"] = numbers
-        if version == VERSION:
+        if version == VERSION:  # what readers of results ask for in any case
             _check_names(numbers, ["goes_uphill"])
             if "velocity" in numbers:
                 _check_names(numbers, ["facings_differ"])

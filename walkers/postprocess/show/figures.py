@@ -499,6 +499,10 @@ def _smooth(columns: Columns, x: str) -> Columns:
     return {name: _interpolated(places, values, dense) for name, values in columns.items()}
 
 
+_NO_WEIGHT = 1e-9
+"""Largest sum of weights, over the largest one, that counts as zero; as in SciPy."""
+
+
 def _interpolated(
     places: npt.NDArray[Any], values: npt.NDArray[Any], dense: npt.NDArray[Any]
 ) -> npt.NDArray[Any]:
@@ -527,12 +531,14 @@ def _interpolated(
     slopes[0] = 2.0 * slopes[1] - slopes[2]
     slopes[-2] = 2.0 * slopes[-3] - slopes[-4]
     slopes[-1] = 2.0 * slopes[-2] - slopes[-3]
-    changes = np.abs(np.diff(slopes)) + 0.5 * np.abs(slopes[1:] + slopes[:-1])
-    before = changes[2:]  # weight of the interval before a sample
-    after = changes[:-2]  # weight of the interval after a sample
+    changes_of_slope = np.abs(np.diff(slopes))
+    size_of_slopes = 0.5 * np.abs(slopes[1:] + slopes[:-1])  # the modification of Akima's weights
+    weight_terms = changes_of_slope + size_of_slopes
+    before = weight_terms[2:]  # weight of the interval before a sample
+    after = weight_terms[:-2]  # weight of the interval after a sample
     weights = before + after
     mean = 0.5 * (slopes[3:] + slopes[:-3])  # where all slopes around a sample are zero
-    is_curved = weights > 1e-9 * weights.max(initial=-np.inf)
+    is_curved = weights > _NO_WEIGHT * weights.max(initial=-np.inf)
     weighted = before * slopes[1:-2] + after * slopes[2:-1]
     tangents = np.where(is_curved, weighted / np.where(is_curved, weights, 1.0), mean)
     interval = np.clip(np.searchsorted(places, dense, side="right") - 1, 0, len(steps) - 1)

@@ -69,7 +69,7 @@ class NeckGrid(NamedTuple):
 
 
 def bridges_at(motion: Motion, frames: npt.ArrayLike) -> list[IntArray]:
-    """Contacts of the recorded bridges that are nearest in time to each of some frames.
+    """Contacts with bridges, as recorded in the frame nearest to each of some frames.
 
     Parameters
     ----------
@@ -81,11 +81,13 @@ def bridges_at(motion: Motion, frames: npt.ArrayLike) -> list[IntArray]:
     Returns
     -------
     list of ndarray, each of shape (K, 3)
-        Contacts as in `walkers.postprocess.measure.motion.Bridges`.
+        Contacts as in `walkers.postprocess.measure.motion.Bridges`: both beads and -1, or the bead,
+        -1 and the wall.
     """
     frames = np.asarray(frames)
-    numbers = np.array([number for _, number in motion.frames])
-    recorded = np.flatnonzero(numbers % motion.case.run.samples_per_bridge_sample == 0)
+    sample_numbers = np.array([number for _, number in motion.frames])
+    samples_per_record = motion.case.run.samples_per_bridge_sample
+    recorded = np.flatnonzero(sample_numbers % samples_per_record == 0)
     if not len(recorded):
         return [NO_BRIDGES] * len(frames)
     distances = np.abs(np.subtract.outer(frames, recorded))

@@ -190,12 +190,25 @@ class Window:
         self._beads.move(1e3 * position + shift, rotations)
 
     def _draw_necks(self, position: FloatArray, bridges: IntArray, shift: FloatArray) -> None:
-        """Draw the liquid necks, but not those to walls before the beads, which are not drawn."""
+        """Draw the liquid necks of bridges.
+
+        Walls between the camera and the beads are not drawn, nor are the necks to them.
+
+        Parameters
+        ----------
+        position : ndarray, shape (N, 3)
+            Positions of the beads, m.
+        bridges : ndarray, shape (K, 3)
+            Contacts with bridges.
+        shift : ndarray, shape (3,)
+            Displacement of the picture, mm.
+        """
         import pyvista as pv
 
         motion = self._scene.motion
         ends = bridge_ends(motion, position, bridges)
-        is_visible = ~at_front_walls(motion, bridges, ends, self._scene.axes[2])
+        toward_camera = self._scene.axes[2]
+        is_visible = ~at_front_walls(motion, bridges, ends, toward_camera)
         contacts = bridges[is_visible]
         self._necks.visibility = bool(len(contacts))
         if not len(contacts):
