@@ -55,6 +55,14 @@ def cases_of(sweep: SweepDefinition) -> list[Case]:
     return list(sweep.cases())
 
 
+def drives_of(sweep: SweepDefinition) -> list[tuple[float, float]]:
+    """Frequency, Hz, and peak acceleration, m/s², of each point."""
+    drives = []
+    for case in sweep.cases():
+        drives.append((case.excitation.frequency, case.excitation.peak_acceleration))
+    return drives
+
+
 def test_axes_multiply_and_the_last_runs_fastest(make_sweep: MakeSweep) -> None:
     axes = {"frequency": ["60 Hz", "80 Hz"], "peak_acceleration": ["1 g", "2 g", "4 g"]}
     sweep = make_sweep(axes={"drive": axes})
@@ -72,11 +80,16 @@ def test_axes_multiply_and_the_last_runs_fastest(make_sweep: MakeSweep) -> None:
 def test_cases_have_the_values_of_their_points_in_si_units(make_sweep: MakeSweep) -> None:
     """ "1 g" is 9.8 m/s², as in the paper."""
     axes = {"frequency": ["60 Hz", "80 Hz"], "peak_acceleration": ["1 g", "2 g"]}
-    cases = cases_of(make_sweep(axes={"drive": axes}))
-    assert [case.excitation.frequency for case in cases] == [60.0, 60.0, 80.0, 80.0]
-    accelerations = [case.excitation.peak_acceleration for case in cases]
-    assert accelerations == pytest.approx([9.8, 19.6, 9.8, 19.6])
-    assert cases[1].title == "test: drive.frequency = 60 Hz, drive.peak_acceleration = 2 g"
+    sweep = make_sweep(axes={"drive": axes})
+    assert drives_of(sweep) == [
+        (60.0, pytest.approx(9.8)),
+        (60.0, pytest.approx(19.6)),
+        (80.0, pytest.approx(9.8)),
+        (80.0, pytest.approx(19.6)),
+    ]
+    assert (
+        cases_of(sweep)[1].title == "test: drive.frequency = 60 Hz, drive.peak_acceleration = 2 g"
+    )
 
 
 def test_keys_that_vary_one_at_a_time_keep_the_first_value_of_the_others(
@@ -114,7 +127,9 @@ def test_a_descent_is_the_last_axis_and_includes_its_end(make_sweep: MakeSweep) 
         "until_below": "1 um/s",
     }
     sweep = make_sweep(axes={"drive.frequency": ["60 Hz", "80 Hz"]}, descend=descent)
-    assert [peak for _, peak in sweep.rows] == ["0.5 g", "0.4 g", "0.3 g", "0.2 g"] * 2
+    frequencies, peaks = zip(*sweep.rows, strict=True)
+    assert frequencies == ("60 Hz",) * 4 + ("80 Hz",) * 4
+    assert peaks == ("0.5 g", "0.4 g", "0.3 g", "0.2 g") * 2
     assert sweep.until_below == pytest.approx(1e-6)
 
 
@@ -125,8 +140,8 @@ def test_linspace_and_geomspace_are_those_of_numpy(make_sweep: MakeSweep) -> Non
             "liquid.volume_fraction": {"geomspace": [1e-3, 1e-1, 5]},
         }
     )
-    peaks = [float(str(peak).removesuffix(" g")) for peak, _ in sweep.rows]
-    fractions = [fraction for _, fraction in sweep.rows]
+    peak_texts, fractions = zip(*sweep.rows, strict=True)
+    peaks = [float(text.removesuffix(" g")) for text in peak_texts]
     # The second axis runs fastest: five fractions for each of twenty accelerations.
     np.testing.assert_allclose(peaks, np.repeat(np.linspace(0.5, 10, 20), 5), rtol=1e-11)
     np.testing.assert_allclose(fractions, np.tile(np.geomspace(1e-3, 1e-1, 5), 20), rtol=1e-11)
@@ -134,9 +149,9 @@ def test_linspace_and_geomspace_are_those_of_numpy(make_sweep: MakeSweep) -> Non
 
 def test_linspace_and_geomspace_of_whole_numbers_are_whole(make_sweep: MakeSweep) -> None:
     axes = {"run.seed": {"linspace": [1, 4, 4]}, "run.cycles": {"geomspace": [10, 40, 3]}}
-    rows = make_sweep(axes=axes).rows
-    assert [seed for seed, _ in rows[::3]] == [1, 2, 3, 4]
-    assert [cycles for _, cycles in rows] == [10, 20, 40] * 4
+    seeds, cycles = zip(*make_sweep(axes=axes).rows, strict=True)
+    assert seeds == (1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4)
+    assert cycles == (10, 20, 40) * 4
 
 
 @pytest.mark.parametrize("seed", [5, 6])
@@ -178,12 +193,12 @@ def test_mean_radius_and_sin_delta_replace_the_radii_of_the_case(make_sweep: Mak
 
 
 def test_the_shipped_sweep_of_fig2_is_the_papers() -> None:
-    cases = cases_of(load_sweep("fig2"))
-    assert len(cases) == 80
-    assert {case.excitation.frequency for case in cases} == {60.0, 70.0, 80.0, 90.0}
-    accelerations = {round(case.excitation.peak_acceleration / 9.8, 9) for case in cases}
-    assert min(accelerations) == 0.5
-    assert max(accelerations) == 10.0
+    """From 0.5 to 10 g at four frequencies."""
+    frequencies, accelerations = zip(*drives_of(load_sweep("fig2")), strict=True)
+    assert len(frequencies) == 80
+    assert set(frequencies) == {60.0, 70.0, 80.0, 90.0}
+    assert min(accelerations) == pytest.approx(0.5 * 9.8, rel=1e-9)
+    assert max(accelerations) == pytest.approx(10.0 * 9.8, rel=1e-9)
 
 
 def test_the_shipped_sweep_of_fig3_is_the_papers() -> None:
@@ -721,12 +736,13 @@ def test_draws_of_a_spread_keep_no_dumps_and_say_how_to_get_them(
 ) -> None:
     """Only pictures need the dumps."""
     assert list(guessed_run.directory.rglob("beads.bin"))
-    draws = [Path(place) for place in walkers.load(guessed_spread.directory).table()["run"]]
+    draws = walkers.load(guessed_spread.directory).runs
+    assert len(draws) == 4
     for draw in draws:
-        assert not list(draw.rglob("beads.bin"))
-        assert read_json(draw / "manifest.json")["left_out"]
+        assert not list(draw.directory.rglob("beads.bin"))
+        assert read_json(draw.directory / "manifest.json")["left_out"]
     with pytest.raises(DumpError, match=r"beads\.bin was left out.*walkers run .*--force"):
-        walkers.load(draws[0]).render()
+        draws[0].render()
 
 
 def test_a_spread_does_not_hold_for_other_ranges(
