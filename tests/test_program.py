@@ -1,4 +1,4 @@
-"""The program and its package, as a user meets them: at a shell, from Python, with and without the extras."""
+"""The program and its package, as a user meets them: at a shell, from Python, without extras."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ import sys
 import tomllib
 import venv
 import zipfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from graphlib import TopologicalSorter
 from importlib import metadata
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import grimp
@@ -49,181 +50,287 @@ from walkers.sweeps.scheduler import SweepOptions
 from walkers.sweeps.site import load_site
 from walkers.theory.prediction import predict
 
+FillOnce = Callable[[str, Callable[[Path], object]], Path]
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 OPTIONAL: dict[str, list[str]] = PROJECT["optional-dependencies"]
-FOR_USERS = {
-    extra: OPTIONAL[extra] for extra in OPTIONAL if extra not in {"all", "docs", "dev", "notebooks"}
-}
+FOR_DEVELOPERS = {"all", "docs", "dev", "notebooks"}
+FOR_USERS = sorted(OPTIONAL.keys() - FOR_DEVELOPERS)
+"""Extras that a user installs for what the program does with them."""
 VERSION = "0.1.1.dev7+g0123abc"
 OURS = canonicalize_name(PROJECT["name"])
 
 
 def names_of(requirements: Iterable[str]) -> list[str]:
-    return [Requirement(one).name for one in requirements]
+    """Sorted names of the distributions that are required."""
+    return sorted(Requirement(requirement).name for requirement in requirements)
 
 
-def closure(requirements: Iterable[str]) -> set[str]:
-    """Names of the distributions that some requirements bring, as they are installed here."""
-    left, seen = [Requirement(one) for one in requirements], set[tuple[str, str]]()
-    while left:
-        one = left.pop()
-        name = canonicalize_name(one.name)
-        for extra in {"", *one.extras} - {other for done, other in seen if done == name}:
-            seen.add((name, extra))
-            ours = OPTIONAL.get(extra, ()) if name == OURS else metadata.requires(name) or ()
-            further = [Requirement(text) for text in ours]
-            left += [
-                it for it in further if it.marker is None or it.marker.evaluate({"extra": extra})
-            ]
-    return {name for name, _ in seen} - {OURS}
+def requirements_of(name: str, extra: str) -> list[str]:
+    """What a distribution that is installed here requires, with an extra or without ("")."""
+    if name == OURS:
+        return OPTIONAL.get(extra, [])
+    required = []
+    for text in metadata.requires(name) or ():
+        marker = Requirement(text).marker
+        if marker is None or marker.evaluate({"extra": extra}):
+            required.append(text)
+    return required
+
+
+def distributions_for(requirements: Iterable[str]) -> set[str]:
+    """Names of the distributions that requirements bring, without our own."""
+    names = set[str]()
+    visited = set[tuple[str, str]]()
+    pending = list(requirements)
+    while pending:
+        requirement = Requirement(pending.pop())
+        name = canonicalize_name(requirement.name)
+        names.add(name)
+        for extra in {"", *requirement.extras}:
+            if (name, extra) not in visited:
+                visited.add((name, extra))
+                pending += requirements_of(name, extra)
+    return names - {OURS}
 
 
 def python(*arguments: str, folder: Path, **environment: str) -> str:
-    """What Python prints; the project in the folder is built by it."""
-    how: dict[str, Any] = {
-        "cwd": folder,
-        "env": os.environ | environment,
-        "capture_output": True,
-        "text": True,
-    }
-    done = subprocess.run([sys.executable, *arguments], check=False, **how)
+    """What Python prints in a folder."""
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
-    return str(done.stdout)
+    return done.stdout
 
 
 @pytest.fixture(scope="module")
-def wheel(once: Callable[[str, Callable[[Path], object]], Path]) -> Path:
-    """Folder with the wheel that is built from the source distribution of the checkout."""
+def wheel(once: FillOnce) -> Path:
+    """The wheel that is built from the source distribution of the checkout."""
 
     def build(folder: Path) -> None:
         source = folder / "source"
+        ignored = shutil.ignore_patterns("__pycache__")
         for package in ("walkers", "studies"):
-            shutil.copytree(
-                ROOT / package, source / package, ignore=shutil.ignore_patterns("__pycache__")
-            )
+            shutil.copytree(ROOT / package, source / package, ignore=ignored)
         for name in ("pyproject.toml", "README.md", "LICENSE"):
             shutil.copy(ROOT / name, source)
-        build = "import setuptools.build_meta as build; print(build.build_{}('..'))"
-        version = "SETUPTOOLS_SCM_PRETEND_VERSION"
-        name = python(
-            "-c", build.format("sdist"), folder=source, **{version: VERSION}
-        ).splitlines()[-1]
-        shutil.unpack_archive(folder / name, folder, filter="data")
-        unpacked = folder / name.removesuffix(".tar.gz")
-        python("-c", build.format("wheel"), folder=unpacked, **{version: ""})
+        backend = "import setuptools.build_meta as build"
+        printed = python(
+            "-c",
+            f"{backend}; print(build.build_sdist('..'))",
+            folder=source,
+            SETUPTOOLS_SCM_PRETEND_VERSION=VERSION,
+        )
+        sdist = printed.splitlines()[-1]
+        shutil.unpack_archive(folder / sdist, folder, filter="data")
+        python(
+            "-c",
+            f"{backend}; print(build.build_wheel('..'))",
+            folder=folder / sdist.removesuffix(".tar.gz"),
+            SETUPTOOLS_SCM_PRETEND_VERSION="",  # the sdist knows its version
+        )
 
-    return once("wheels", build)
+    (built,) = once("wheels", build).glob("*.whl")
+    return built
 
 
 @pytest.fixture(scope="module")
-def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The Python of an environment that holds the wheel and its mandatory packages, and nothing else."""
+def bare_python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The Python of an environment with the wheel and its mandatory packages alone."""
     place = tmp_path_factory.mktemp("bare")
     venv.create(place, with_pip=False, symlinks=True)
-    (site,) = place.glob("lib/python*/site-packages")
-    for name in closure(PROJECT["dependencies"]):
-        one = metadata.distribution(name)
-        for part in {
-            file.parts[0] for file in one.files or () if file.parts[0] not in {"..", "__pycache__"}
-        }:
-            if not (site / part).exists():
-                (site / part).symlink_to(Path(str(one.locate_file(part))).resolve())
-    shutil.unpack_archive(next(wheel.glob("*.whl")), site, "zip")
+    (site_packages,) = place.glob("lib/python*/site-packages")
+    for name in distributions_for(PROJECT["dependencies"]):
+        distribution = metadata.distribution(name)
+        for file in distribution.files or ():
+            entry = file.parts[0]
+            link = site_packages / entry
+            if entry not in ("..", "__pycache__") and not link.exists():
+                link.symlink_to(Path(str(distribution.locate_file(entry))).resolve())
+    shutil.unpack_archive(wheel, site_packages, "zip")
     return place / "bin" / "python"
 
 
-def test_the_wheel_of_the_sdist_holds_all_files_of_the_package(wheel: Path) -> None:
-    """And nothing else: no study."""
-    with zipfile.ZipFile(next(wheel.glob("*.whl"))) as packed:
-        held = {one: packed.read(one) for one in packed.namelist() if ".dist-info/" not in one}
-    files = [
-        path
-        for path in (ROOT / "walkers").rglob("*")
-        if path.is_file() and "__pycache__" not in path.parts
-    ]
-    assert held == {
-        path.relative_to(ROOT).as_posix(): path.read_bytes()
-        for path in files
-        if path.name[0] != "."
-    }
+def test_the_wheel_of_the_sdist_holds_all_files_of_the_package_and_no_study(wheel: Path) -> None:
+    packed = {}
+    with zipfile.ZipFile(wheel) as archive:
+        for name in archive.namelist():
+            if ".dist-info/" not in name:
+                packed[name] = archive.read(name)
+    files = {}
+    for path in (ROOT / "walkers").rglob("*"):
+        hidden = path.name.startswith(".") or "__pycache__" in path.parts
+        if path.is_file() and not hidden:
+            files[path.relative_to(ROOT).as_posix()] = path.read_bytes()
+    assert packed == files
+
+
+CALLS = """
+import sys
+from walkers.main import main
+for command in sys.argv[1:]:
+    try:
+        main(command.split())
+    except SystemExit as end:
+        print("status", end)
+"""
+"""Calls several commands in a process, because each start takes two seconds."""
+
+
+def printed_path(name: str, printed: str) -> Path:
+    """The path of a file among printed ones."""
+    (path,) = re.findall(rf"\S*/{name}", printed)
+    return Path(path)
 
 
 @pytest.mark.slow
-def test_mandatory_packages_run_tabulate_and_draw(bare: Path, in_folder: Path) -> None:
-    """Several commands in one process: each start takes two seconds."""
+def test_mandatory_packages_run_tabulate_and_draw(bare_python: Path, in_folder: Path) -> None:
+    """A report needs k3d, which is not there: it is refused, and nothing is written."""
     (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
-    calls = "for words in sys.argv[1:]:\n  try: main(words.split())\n  except SystemExit as end: print('status', end)"
-    commands = ("--version", *(f"{name} mine.toml" for name in ("run", "plot", "render", "report")))
-    script = [bare, "-c", f"import sys; from walkers.main import main\n{calls}", *commands]
+    commands = ["--version", "run mine.toml", "plot mine.toml", "render mine.toml"]
+    commands.append("report mine.toml")
+    script = [bare_python, "-c", CALLS, *commands]
     done = subprocess.run(script, check=True, capture_output=True, text=True)
-    version, ran, plotted, rendered, reported, _ = re.split(r"status (\d)\n", done.stdout)[::2]
-    assert re.findall(r"status (\d)\n", done.stdout) == ["0", "0", "0", "0", "2"], done.stderr
+    parts = re.split(r"status (\d)\n", done.stdout)
+    assert parts[1::2] == ["0", "0", "0", "0", "2"], done.stderr
+    version, results, plotted, rendered, reported, _ = parts[::2]
     assert "0.1.1.dev7 (commit 0123abc)" in version
-    assert "velocity" in ran
-    pictures = [*plotted.split(), *rendered.split()]
-    assert {"walk.png", "walker.png"} <= {Path(one).name for one in pictures if Path(one).is_file()}
-    assert (reported, "needs k3d: make extras" in done.stderr) == ("", True)
+    assert "velocity" in results
+    assert printed_path("walk.png", plotted).is_file()
+    assert printed_path("walker.png", rendered).is_file()
+    assert reported == ""
+    assert "needs k3d: make extras" in done.stderr
     assert not list(in_folder.rglob("report.html"))
 
 
-NEEDING: dict[str, list[Callable[[walkers.Run, Path], object]]] = {
-    "archive": [lambda run, out: run.export("archive", out / "run.zip")],
-    "calibrate": [lambda _, out: calibrate(load_calibration("ruby"), out, SweepOptions(1))],
-    "check": [lambda *_: importlib.reload(importlib.import_module("walkers.second_engine"))],
-    "cluster": [lambda _, out: load_site(out / "site.toml")],
-    "film": [lambda run, out: run.film(out / "film.mp4")],
-    "report": [lambda run, out: run.report(out / "run.html"), lambda run, _: run.view()],
-    "theory": [
-        lambda *_: predict(walkers.load_case("fig1b")),
-        lambda _, out: make_figures(out / "runs", out / "figures", SweepOptions(1)),
-    ],
-}
+def export_archive(run: walkers.Run, folder: Path) -> None:
+    run.export("archive", folder / "run.zip")
 
 
-@pytest.mark.parametrize("extra", EXTRAS)
+def calibrate_ruby(_: walkers.Run, folder: Path) -> None:
+    calibrate(load_calibration("ruby"), folder, SweepOptions(1))
+
+
+def import_second_engine(*_: object) -> ModuleType:
+    return importlib.reload(importlib.import_module("walkers.second_engine"))
+
+
+def read_site(_: walkers.Run, folder: Path) -> None:
+    load_site(folder / "site.toml")
+
+
+def make_film(run: walkers.Run, folder: Path) -> None:
+    run.film(folder / "film.mp4")
+
+
+def write_report(run: walkers.Run, folder: Path) -> None:
+    run.report(folder / "run.html")
+
+
+def show_in_notebook(run: walkers.Run, _: Path) -> None:
+    run.view()
+
+
+def predict_a_walk(*_: object) -> None:
+    predict(walkers.load_case("fig1b"))
+
+
+def draw_the_paper(_: walkers.Run, folder: Path) -> None:
+    make_figures(folder / "runs", folder / "figures", SweepOptions(1))
+
+
+USES: list[tuple[str, Callable[[walkers.Run, Path], object]]] = [
+    ("archive", export_archive),
+    ("calibrate", calibrate_ruby),
+    ("check", import_second_engine),
+    ("cluster", read_site),
+    ("film", make_film),
+    ("report", write_report),
+    ("report", show_in_notebook),
+    ("theory", predict_a_walk),
+    ("theory", draw_the_paper),
+]
+"""Extras, and what needs their packages."""
+
+
+@pytest.mark.parametrize(("extra", "use"), USES)
 def test_what_needs_an_extra_names_it_before_it_begins(
-    extra: str, run_directory: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    extra: str,
+    use: Callable[[walkers.Run, Path], object],
+    run_directory: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     run = walkers.load(run_directory(run=SHORT))
-    for package in EXTRAS[extra][1]:
+    purpose, packages = EXTRAS[extra]
+    for package in packages:
         monkeypatch.setitem(sys.modules, module_of(package), None)
-    message = (
-        rf"^{EXTRAS[extra][0]} needs [\w, -]+: make extras, or pip install '{OURS}\[{extra}\]'$"
-    )
-    for use in NEEDING[extra]:
-        with pytest.raises(ExtraMissing, match=message):
-            use(run, tmp_path)
+    message = rf"^{purpose} needs [\w, -]+: make extras, or pip install '{OURS}\[{extra}\]'$"
+    with pytest.raises(ExtraMissing, match=message):
+        use(run, tmp_path)
     assert not list(tmp_path.iterdir())
 
 
-def test_every_package_that_is_imported_is_declared() -> None:
-    """As mandatory, or in an extra whose table in the program agrees with ``pyproject.toml``."""
-    assert {extra: sorted(packages) for extra, (_, packages) in EXTRAS.items()} == {
-        extra: sorted(names_of(requirements)) for extra, requirements in FOR_USERS.items()
-    }
-    assert Requirement(OPTIONAL["all"][0]).extras == FOR_USERS.keys()
-    declared = names_of(
-        [*PROJECT["dependencies"], *(one for given in FOR_USERS.values() for one in given)]
-    )
-    modules = {
-        name: {file.parts[0].removesuffix(".py") for file in metadata.files(name) or ()}
-        for name in declared
-    }
-    of_others = {
-        "IPython",
-        "paraview",
-        "pydantic_core",
-        "vtkmodules",
-        "setuptools",
-    }  # of a notebook, of pydantic, …
-    used = {
-        name.partition(".")[0]
-        for name in grimp.build_graph("walkers", include_external_packages=True).modules
-    }
-    used -= {*sys.stdlib_module_names, "walkers", *of_others}
-    assert used - set().union(*modules.values()) == set()
-    assert [name for name in declared if not modules[name] & used] == [], "declared and not used"
+def test_a_use_of_every_extra_is_tested() -> None:
+    tested, _ = zip(*USES, strict=True)
+    assert set(tested) == EXTRAS.keys()
+
+
+def test_extras_of_the_program_are_those_of_the_project() -> None:
+    of_program = {}
+    for extra, (_, packages) in EXTRAS.items():
+        of_program[extra] = sorted(packages)
+    of_project = {}
+    for extra in FOR_USERS:
+        of_project[extra] = names_of(OPTIONAL[extra])
+    assert of_program == of_project
+
+
+def test_the_extra_all_brings_every_extra_for_users() -> None:
+    assert Requirement(OPTIONAL["all"][0]).extras == set(FOR_USERS)
+
+
+OF_OTHER_PACKAGES = {"IPython", "paraview", "pydantic_core", "vtkmodules", "setuptools"}
+"""Modules that come with a notebook, with pydantic, with PyVista …"""
+
+
+@pytest.fixture(scope="module")
+def imported_modules() -> set[str]:
+    """Top modules that the package imports, without Python's own."""
+    graph = grimp.build_graph("walkers", include_external_packages=True)
+    tops = {name.partition(".")[0] for name in graph.modules}
+    return tops - sys.stdlib_module_names - OF_OTHER_PACKAGES - {"walkers"}
+
+
+@pytest.fixture(scope="module")
+def declared_modules() -> dict[str, set[str]]:
+    """Top modules of each distribution that the project declares for users."""
+    requirements = list(PROJECT["dependencies"])
+    for extra in FOR_USERS:
+        requirements += OPTIONAL[extra]
+    modules = {}
+    for name in names_of(requirements):
+        files = metadata.files(name) or ()
+        modules[name] = {file.parts[0].removesuffix(".py") for file in files}
+    return modules
+
+
+def test_every_package_that_is_imported_is_declared(
+    imported_modules: set[str], declared_modules: dict[str, set[str]]
+) -> None:
+    assert imported_modules - set().union(*declared_modules.values()) == set()
+
+
+def test_every_package_that_is_declared_is_imported(
+    imported_modules: set[str], declared_modules: dict[str, set[str]]
+) -> None:
+    unused = [name for name, tops in declared_modules.items() if not tops & imported_modules]
+    assert unused == []
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
@@ -234,32 +341,71 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
     TopologicalSorter(imports).prepare()
 
 
-def test_a_fault_that_cannot_be_planted_or_seen_is_named() -> None:
-    """Its text has gone, or is there twice; or the tests that are to see it have gone."""
-    sound = {
-        "name": "sound",
-        "file": "tests/conftest.py",
-        "new": "",
-        "tests": ["tests/test_program.py -k planted"],
-    }
-    sound["old"] = "def brief_pile("
-    wrong = {
-        "gone": {"old": "def a_function_that_nobody_wrote("},
-        "twice": {"old": "import"},
-        "nothing": {"new": "def brief_pile("},
-        "no file": {"file": "tests/test_nothing.py"},
-        "no test": {"tests": ["tests/test_words.py -k nobody_wrote_it"]},
-        "no tests": {"tests": ["tests/test_nothing.py"]},
-    }
-    faults = [sound, *({**sound, "name": name, **changes} for name, changes in wrong.items())]
-    found = problems_of(faults)
-    assert [problem.partition(":")[0] for problem in found] == [*wrong]
-    assert problems_of([sound, sound]) == ["sound: the name of 2 faults"]
+SOUND_FAULT = {
+    "name": "sound",
+    "file": "pyproject.toml",
+    "old": "[build-system]",
+    "new": "",
+    "tests": ["tests/test_program.py -k planted"],
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        pytest.param(
+            {"old": "a line that nobody wrote"},
+            "the old text is 0 times in pyproject.toml, not once",
+            id="text that has gone",
+        ),
+        pytest.param(
+            {"old": "pytest"}, "times in pyproject.toml, not once", id="text in several places"
+        ),
+        pytest.param(
+            {"new": "[build-system]"},
+            "the new text is the old one",
+            id="fault that changes nothing",
+        ),
+        pytest.param(
+            {"file": "tests/test_nothing.py"},
+            "the old text is 0 times in tests/test_nothing.py, not once",
+            id="file that has gone",
+        ),
+        pytest.param(
+            {"tests": ["tests/test_words.py -k nobody_wrote_it"]},
+            "tests/test_words.py has no nobody_wrote_it",
+            id="test that has gone",
+        ),
+        pytest.param(
+            {"tests": ["tests/test_nothing.py"]},
+            "there is no tests/test_nothing.py",
+            id="file of tests that has gone",
+        ),
+    ],
+)
+def test_a_fault_that_cannot_be_planted_or_seen_is_named(
+    changes: dict[str, Any], problem: str
+) -> None:
+    (line,) = problems_of([SOUND_FAULT | changes])
+    assert line.startswith("sound: ")
+    assert line.endswith(problem)
+
+
+def test_a_sound_fault_has_no_problem() -> None:
+    assert problems_of([SOUND_FAULT]) == []
+
+
+def test_faults_have_different_names() -> None:
+    assert problems_of([SOUND_FAULT, SOUND_FAULT]) == ["sound: the name of 2 faults"]
 
 
 @pytest.mark.smoke
 def test_two_beads_walk_toward_the_large_one(run_directory: Callable[..., Path]) -> None:
-    """A 2-bead deck through the whole pipeline in a second or two: if this fails, nothing else is worth looking at."""
+    """A deck of two beads through the whole pipeline in a second or two.
+
+    If this fails, nothing else is worth looking at. The paper's walkers go at some mm/s. There are
+    six cycles of ten samples, and one sample at the start.
+    """
     directory = run_directory(run=SHORT)
     assert is_finished(directory)
     assert read_manifest(directory)["engine"]["version"] == "LIGGGHTS-PUBLIC 3.8.0"
@@ -267,66 +413,124 @@ def test_two_beads_walk_toward_the_large_one(run_directory: Callable[..., Path])
     assert len(read_table(directory, "trajectory")) == 61
 
 
-def test_from_a_case_file_to_a_deck_and_a_run(
-    in_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Progress is plain lines without a terminal. The first one is due after a second; here at once."""
-    monkeypatch.setattr("walkers.progress._FIRST_LINE_SECONDS", 0.0)
-    (in_folder / "mine.toml").write_text(to_toml(document(run={**SHORT, "cycles": 30})))
+def test_a_deck_is_printed_or_written_to_a_new_folder(in_folder: Path) -> None:
+    (in_folder / "mine.toml").write_text(to_toml(document(run=SHORT)))
     printed = call("export", "mine.toml", "--to", "deck", check=True).stdout
     call("export", "mine.toml", "--to", "deck", "-o", "deck", check=True)
     assert (in_folder / "deck" / "walker.lig").read_text() == printed
-    assert call("export", "mine.toml", "--to", "deck", "-o", "deck").returncode == 2
-    done = call("run", "mine.toml", check=True)
+    again = call("export", "mine.toml", "--to", "deck", "-o", "deck")
+    assert again.returncode == 2
+
+
+FirstRun = tuple[Path, subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture(scope="module")
+def first_run(tmp_path_factory: pytest.TempPathFactory) -> FirstRun:
+    """A folder with a run of ``mine.toml``, and what the program said of it.
+
+    The first line of progress is due after a second; here it is due at once.
+    """
+    folder = tmp_path_factory.mktemp("first")
+    (folder / "mine.toml").write_text(to_toml(document(run={**SHORT, "cycles": 30})))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("walkers.progress._FIRST_LINE_SECONDS", 0.0)
+        return folder, call("run", "mine.toml", check=True, folder=folder)
+
+
+def test_a_run_prints_its_result(first_run: FirstRun) -> None:
+    _, done = first_run
     assert "velocity along the heading" in done.stdout
-    lines = [line for line in done.stderr.splitlines() if not line.startswith("walkers: warning:")]
+
+
+def test_progress_is_plain_lines_without_a_terminal(first_run: FirstRun) -> None:
+    _, done = first_run
+    progress = re.compile(r"mine: (starting|\d+ %(, .* left, .*s simulated, .*steps/s)?|measuring)")
+    lines = []
+    for line in done.stderr.splitlines():
+        if not line.startswith("walkers: warning:"):
+            lines.append(line)
+            assert progress.fullmatch(line)
     assert lines
-    progress = re.compile(
-        r"mine: (starting|\d+ %(, .* left, .*s simulated, .*steps/s)?|measuring)$"
-    )
-    assert all(map(progress.match, lines)), lines
-    assert "(already run)" in call("run", "mine.toml", check=True).stdout
-    written = Path(call("export", "--to", "vtk", "mine.toml", check=True).stdout.strip())
-    assert (written.name, written.exists()) == ("walkers.pvd", True)
 
 
-@pytest.mark.parametrize("name", ["fig1b", "climber", "cluster", "tray", "pile-small"])
-def test_a_new_case_runs_and_its_lines_that_are_commented_out_say_what_holds_without_them(
-    name: str, in_folder: Path
+def test_a_finished_run_is_not_run_again(first_run: FirstRun) -> None:
+    folder, _ = first_run
+    assert "(already run)" in call("run", "mine.toml", check=True, folder=folder).stdout
+
+
+def test_an_export_for_paraview_prints_where_it_is(first_run: FirstRun) -> None:
+    folder, _ = first_run
+    printed = call("export", "--to", "vtk", "mine.toml", check=True, folder=folder).stdout
+    written = folder / printed.strip()
+    assert written.name == "walkers.pvd"
+    assert written.exists()
+
+
+def commented_out_values(text: str) -> dict[str, Any]:
+    """Values that a case file has in its comments, such as ``# angle = "0 deg"``, by key."""
+    values = {}
+    table = ""
+    for line in text.splitlines():
+        header = re.fullmatch(r"(?:# )?\[+(\w+)\]+.*", line)
+        assignment = re.fullmatch(r"# ([\w.]+) *= *(.+)", line)
+        if header and header[1] == "clusters":
+            table = "clusters[0]"
+        elif header:
+            table = header[1]
+        elif assignment:
+            key = f"{table}.{assignment[1]}"
+            values[key] = tomllib.loads(f"value = {assignment[2]}")["value"]
+    return values
+
+
+def rounded_determinants(case: walkers.Case) -> str:
+    """What determines a run, with 12 digits after the point."""
+    return re.sub(r"(\.\d{12})\d+", r"\1", json.dumps(case.determinants()))
+
+
+NEW_CASES = ["fig1b", "climber", "cluster", "tray", "pile-small"]
+
+
+@pytest.mark.parametrize("name", NEW_CASES)
+def test_lines_of_a_new_case_that_are_commented_out_say_what_holds_without_them(
+    name: str,
 ) -> None:
-    assert (
-        call("new", "mine", *([] if name == "fig1b" else [name]), check=True).stdout
-        == "mine.toml\n"
-    )
-    text = Path("mine.toml").read_text()
-    assert text == shipped("case")[name].read_text()
-    loose = {"run.duration": "0.05 s", "run.longest_settling": "0 s"}
-    short = loose if "duration" in text else {"run.cycles": 12, "run.settling_cycles": 4}
-    case = load_case("mine", short)
-    assert (
-        "mine: 170 Hz"
-        if case.loose
-        else "mm/s" in call("run", "mine", *settings(short), check=True).stdout
-    )
-    table, tried = "", 0
-    for head, key, value in re.findall(
-        r"(?m)^(?:(?:# )?\[+(\w+)\]+.*|# ([\w.]+) *= *(.+?)(?: *#.*)?)$", text
-    ):
-        table = {"clusters": "clusters[0]"}.get(head, head) or table
-        if key:
-            with_it = load_case(
-                "mine", {f"{table}.{key}": tomllib.loads(f"value = {value}")["value"]}
-            )
-            said, without = (json.dumps(one.determinants()) for one in (with_it, load_case("mine")))
-            assert re.sub(r"(\.\d{12})\d+", r"\1", said) == re.sub(
-                r"(\.\d{12})\d+", r"\1", without
-            ), key
-            tried += 1
-    assert tried >= 3
+    case = load_case(name)
+    values = commented_out_values(shipped("case")[name].read_text())
+    assert len(values) >= 3
+    for key, value in values.items():
+        with_value = load_case(name, {key: value})
+        assert rounded_determinants(with_value) == rounded_determinants(case), key
 
 
-def settings(changes: Mapping[str, object]) -> list[str]:
-    return [word for key, value in changes.items() for word in ("--set", f"{key}={value}")]
+CYCLES = ["--set", "run.cycles=12", "--set", "run.settling_cycles=4"]
+SECONDS = ["--set", "run.duration=0.02 s", "--set", "run.longest_settling=0 s"]
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "printed"),
+    [
+        ("fig1b", CYCLES, "mm/s"),
+        ("climber", CYCLES, "mm/s"),
+        ("tray", CYCLES, "mm/s"),
+        # Loose beads are no walkers: their results begin with the drive.
+        ("cluster", CYCLES, "mine: 170 Hz"),
+        ("pile-small", SECONDS, "mine: 170 Hz"),
+    ],
+    ids=["fig1b", "climber", "tray", "cluster", "pile-small"],
+)
+def test_a_new_case_is_the_shipped_one_and_runs(
+    name: str, settings: list[str], printed: str, in_folder: Path
+) -> None:
+    assert call("new", "mine", name, check=True).stdout == "mine.toml\n"
+    assert Path("mine.toml").read_text() == shipped("case")[name].read_text()
+    assert printed in call("run", "mine", *settings, check=True).stdout
+
+
+def test_a_new_case_is_that_of_fig1b_unless_another_one_is_named(in_folder: Path) -> None:
+    assert call("new", "mine", check=True).stdout == "mine.toml\n"
+    assert Path("mine.toml").read_text() == shipped("case")["fig1b"].read_text()
 
 
 @pytest.mark.parametrize("command", ALL_COMMANDS, ids=lambda command: command.name)
@@ -339,25 +543,35 @@ def test_the_table_of_commands_says_what_they_do(command: Command) -> None:
         assert " ".join(first_paragraph.split()) == command.summary
 
 
-def test_every_public_function_of_the_modules_of_commands_is_a_command() -> None:
+def public_functions(module: ModuleType) -> set[str]:
+    """Names of the public functions that a module defines."""
+    names = set()
+    for name, function in inspect.getmembers(module, inspect.isfunction):
+        if function.__module__ == module.__name__ and not name.startswith("_"):
+            names.add(name)
+    return names
+
+
+def commands_of_apps(module: ModuleType) -> set[str]:
+    """Names of the functions behind apps of a module, which have commands of their own."""
+    names = set()
+    for value in vars(module).values():
+        if isinstance(value, App):
+            names |= set(value)
+            if value.default_command:
+                names.add(value.default_command.__name__)
+    return names
+
+
+COMMAND_MODULES = sorted({command.place.partition(":")[0] for command in ALL_COMMANDS})
+
+
+@pytest.mark.parametrize("name", COMMAND_MODULES)
+def test_every_public_function_of_the_modules_of_commands_is_a_command(name: str) -> None:
+    module = importlib.import_module(name)
     places = {command.place for command in ALL_COMMANDS}
-    for module in {place.partition(":")[0] for place in places}:
-        functions = inspect.getmembers(importlib.import_module(module), inspect.isfunction)
-        own = {
-            f"{module}:{name}"
-            for name, function in functions
-            if function.__module__ == module and name[0] != "_"
-        }
-        apps = inspect.getmembers(
-            importlib.import_module(module), lambda value: isinstance(value, App)
-        )
-        of_apps = {
-            f"{module}:{name}" for _, app in apps for name in map(str, app) if name[0] != "-"
-        }
-        of_apps |= {
-            f"{module}:{app.default_command.__name__}" for _, app in apps if app.default_command
-        }
-        assert own - of_apps <= places
+    for function in public_functions(module) - commands_of_apps(module):
+        assert f"{name}:{function}" in places
 
 
 @pytest.mark.parametrize(
@@ -374,79 +588,123 @@ def test_every_public_function_of_the_modules_of_commands_is_a_command() -> None
 def test_errors_come_back_from_another_process(error: WalkersError) -> None:
     """As those of the workers of an executor do."""
     again = pickle.loads(pickle.dumps(error))
-    assert (type(again), str(again), vars(again).keys()) == (
-        type(error),
-        str(error),
-        vars(error).keys(),
-    )
+    assert type(again) is type(error)
+    assert str(again) == str(error)
+    assert vars(again).keys() == vars(error).keys()
 
 
-def test_help_names_every_command() -> None:
-    shown, app = call("--help", check=True).stdout, program()
-    for name in (name for name in app if name[0] != "-"):
-        assert f"\n  {name} " in shown
-        assert call(name, "-h", check=True).stdout == call(name, "--help", check=True).stdout
-        assert all(
-            f"walkers {name} {part} " in call(name, part, "-h", check=True).stdout
-            for part in app[name]
-            if part[0] != "-"
-        )
-    done = subprocess.run(
-        [sys.executable, "-m", "walkers", "-h"], capture_output=True, text=True, check=True
-    )
-    assert done.stdout == shown
-    assert (
-        call("--version", check=True).stdout.splitlines()[1]
-        == f"LIGGGHTS-PUBLIC 3.8.0, {find_engine().path}"
-    )
+def command_names(app: App) -> list[str]:
+    """Names of the commands of an app, without its options."""
+    return [name for name in app if not name.startswith("-")]
+
+
+@pytest.fixture(scope="module")
+def program_help() -> str:
+    return call("--help", check=True).stdout
+
+
+@pytest.mark.parametrize("name", command_names(program()))
+def test_help_names_every_command(name: str, program_help: str) -> None:
+    assert f"\n  {name} " in program_help
+    command_help = call(name, "--help", check=True).stdout
+    assert call(name, "-h", check=True).stdout == command_help
+    for part in command_names(program()[name]):
+        assert f"walkers {name} {part} " in call(name, part, "-h", check=True).stdout
+
+
+def test_python_runs_the_package_as_the_program(program_help: str) -> None:
+    command = [sys.executable, "-m", "walkers", "-h"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout == program_help
+
+
+def test_the_version_names_the_engine() -> None:
+    _, engine, *_ = call("--version", check=True).stdout.splitlines()
+    assert engine == f"LIGGGHTS-PUBLIC 3.8.0, {find_engine().path}"
+
+
+def test_make_names_its_targets() -> None:
     targets = subprocess.run(["make"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    assert all(f"make {target}" in targets for target in ("walker", "test", "help", "clean"))
+    for target in ("walker", "test", "help", "clean"):
+        assert f"make {target}" in targets
 
 
-SLOW = "cyclopts rich pydantic numpy scipy pandas matplotlib pyarrow pyvista pint"
-PUBLIC = (
-    "import walkers.inputs, walkers.api, walkers.postprocess.show.report.run, walkers.sweeps.report"
-)
-LOADED: dict[str, tuple[str, str, set[str]]] = {
-    "help": ("import walkers.main as m; m._status(['--help'])", SLOW, set()),
-    "list": (
-        "import walkers.main as m; m._status(['list'])",
-        SLOW,
-        {"cyclopts", "numpy", "pydantic"},
-    ),
-    "package": (PUBLIC, "inputs runner sweeps IPython", set()),
+SLOW_MODULES = {
+    "cyclopts",
+    "rich",
+    "pydantic",
+    "numpy",
+    "scipy",
+    "pandas",
+    "matplotlib",
+    "pyarrow",
+    "pyvista",
+    "pint",
 }
-"""What is done, modules that take long to import, or are others', and those of them that are loaded then."""
+"""Modules that take long to import."""
 
 
-@pytest.mark.parametrize("name", LOADED)
-def test_no_more_is_loaded_than_is_needed(name: str, in_folder: Path) -> None:
-    """Others may have a module called inputs or runner, and theirs is theirs. Nothing public needs a notebook."""
-    script, modules, expected = LOADED[name]
-    assert {
-        *python("-c", f"{script}; import sys; print(*sys.modules)", folder=in_folder)
-        .splitlines()[-1]
-        .split()
-    } & {*modules.split()} == expected
+def loaded_by(statements: str, folder: Path) -> set[str]:
+    """Modules that are loaded after some statements of Python in a process of its own."""
+    printed = python("-c", f"{statements}; import sys; print(*sys.modules)", folder=folder)
+    return set(printed.splitlines()[-1].split())
 
 
-def test_a_function_gives_what_its_command_prints(looked_through: Path) -> None:
-    out = ["--out", str(looked_through)]
-    printed = json.loads(call("show", "fig1b", "--theory", "--json", *out, check=True).stdout)
-    assert json.loads(json.dumps(walkers.predict("fig1b", looked_through))) == printed
-    runs = [Path(run).name for run in walkers.load("grid", looked_through).table()["run"][:2]]
-    printed = json.loads(call("compare", *runs, "--json", *out, check=True).stdout)
-    assert json.loads(json.dumps(walkers.compare(*runs, looked_through).contents)) == printed
+def test_the_help_loads_no_slow_module(in_folder: Path) -> None:
+    loaded = loaded_by("import walkers.main as m; m._status(['--help'])", in_folder)
+    assert loaded & SLOW_MODULES == set()
+
+
+def test_a_list_loads_few_slow_modules(in_folder: Path) -> None:
+    loaded = loaded_by("import walkers.main as m; m._status(['list'])", in_folder)
+    assert loaded & SLOW_MODULES == {"cyclopts", "numpy", "pydantic"}
+
+
+def test_the_package_loads_no_module_under_a_name_that_users_may_have(in_folder: Path) -> None:
+    """Links at the top of the checkout have such names. Nothing public needs a notebook."""
+    public = (
+        "import walkers.inputs, walkers.api",
+        "import walkers.postprocess.show.report.run, walkers.sweeps.report",
+    )
+    loaded = loaded_by("; ".join(public), in_folder)
+    assert loaded & {"inputs", "runner", "sweeps", "IPython"} == set()
+
+
+def as_json(value: object) -> Any:
+    """What JSON keeps of a value."""
+    return json.loads(json.dumps(value))
+
+
+def test_predict_gives_what_its_command_prints(looked_through: Path) -> None:
+    done = call("show", "fig1b", "--theory", "--json", "--out", str(looked_through), check=True)
+    assert as_json(walkers.predict("fig1b", looked_through)) == json.loads(done.stdout)
+
+
+def test_compare_gives_what_its_command_prints(looked_through: Path) -> None:
+    runs = walkers.load("grid", looked_through).runs
+    first = runs[0].directory.name
+    second = runs[1].directory.name
+    done = call("compare", first, second, "--json", "--out", str(looked_through), check=True)
+    comparison = walkers.compare(first, second, looked_through)
+    assert as_json(comparison.contents) == json.loads(done.stdout)
+
+
+def test_compare_refuses_sweeps_in_the_words_of_its_command(looked_through: Path) -> None:
     with pytest.raises(InputError, match=r"grid: is a sweep.s directory: walkers list"):
         walkers.compare("grid", "rough", looked_through)
-    input_error = call("list", "grid", "--all", *out).stderr
-    assert input_error == "walkers: --all: is for folders, not for a sweep\n"
 
 
-def test_the_package_exports_few_names_that_are_documented() -> None:
-    assert (
-        dir(walkers)
-        == walkers.__all__
-        == sorted(walkers.__all__, key=lambda name: (name.islower(), name))
-    )
-    assert all(getattr(walkers, name).__doc__ for name in walkers.__all__)
+def test_an_option_for_folders_is_not_for_a_sweep(looked_through: Path) -> None:
+    done = call("list", "grid", "--all", "--out", str(looked_through))
+    assert done.stderr == "walkers: --all: is for folders, not for a sweep\n"
+
+
+def test_the_package_exports_its_public_names_alone() -> None:
+    """Classes come first, and functions after them."""
+    assert dir(walkers) == walkers.__all__
+    assert walkers.__all__ == sorted(walkers.__all__, key=lambda name: (name.islower(), name))
+
+
+@pytest.mark.parametrize("name", walkers.__all__)
+def test_public_names_are_documented(name: str) -> None:
+    assert getattr(walkers, name).__doc__
