@@ -1,4 +1,4 @@
-"""How the code is built: what CONTRIBUTING says of the house, and that decisions are taken from values."""
+"""CONTRIBUTING describes the house as it is, and the code takes decisions from values."""
 
 from __future__ import annotations
 
@@ -68,10 +68,10 @@ def _is_message(value: ast.expr, errors: set[str]) -> bool:
 
 def _decisions_from_texts(tree: ast.AST) -> Iterator[str]:
     """Expressions that search or cut a message."""
-    errors = {
-        node.name for node in ast.walk(tree) if isinstance(node, ast.ExceptHandler) and node.name
-    }
-    errors |= {"error", "failure", "stop", "warning", "problem"}
+    errors = {"error", "failure", "stop", "warning", "problem"}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ExceptHandler) and node.name:
+            errors.add(node.name)
     for node in ast.walk(tree):
         match node:
             case ast.Call(func=ast.Attribute(value=value, attr=method), args=[_, *_]):
@@ -104,50 +104,57 @@ def test_what_searches_or_cuts_a_message_is_recognised(line: str) -> None:
 
 
 def test_no_message_is_searched_or_cut() -> None:
-    decisions = {
-        (path.relative_to(ROOT).as_posix(), text)
-        for path in sorted((ROOT / "walkers").rglob("*.py"))
-        for text in _decisions_from_texts(ast.parse(path.read_text("utf-8")))
-    }
+    decisions = set()
+    for path in (ROOT / "walkers").rglob("*.py"):
+        for text in _decisions_from_texts(ast.parse(path.read_text("utf-8"))):
+            decisions.add((path.relative_to(ROOT).as_posix(), text))
     assert decisions == ALLOWED
+
+
+def _first_cells(heads: str) -> list[str]:
+    """First cells of the rows of a table of CONTRIBUTING, which follow its heads."""
+    _, _, table = CONTRIBUTING.partition(heads)
+    rows = table.split("\n\n")[0]
+    return re.findall(r"(?m)^\| (`[^|]+) \|", rows)
 
 
 def _rooms_of_the_table() -> list[str]:
     """Names of the rooms of ``walkers/``, in the order of the table of CONTRIBUTING."""
-    _, _, table = CONTRIBUTING.partition("| room | holds |")
-    rows = table.split("\n\n")[0]
-    return re.findall(r"(?m)^\| `walkers/(\w+)(?:\.py)?` \|", rows)
+    rooms = []
+    for cell in _first_cells("| room | holds |"):
+        room = re.fullmatch(r"`walkers/(\w+)(?:\.py)?`", cell)
+        if room:
+            rooms.append(room[1])
+    return rooms
 
 
 def test_contributing_names_every_room_and_no_other() -> None:
-    rooms = {path.parent.name for path in (ROOT / "walkers").glob("*/__init__.py")}
-    assert set(_rooms_of_the_table()) == rooms | {"api", "main"}
+    packages = {path.parent.name for path in (ROOT / "walkers").glob("*/__init__.py")}
+    assert set(_rooms_of_the_table()) == packages | {"api", "main"}
 
 
 def test_rooms_are_listed_in_the_order_in_which_they_know_each_other() -> None:
-    (contract, *_) = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"][
-        "importlinter"
-    ]["contracts"]
-    layers = [set(layer.split(" | ")) for layer in reversed(contract["layers"])]
-    place = {room: number for number, layer in enumerate(layers) for room in layer}
+    """The first contract of import-linter has the layers; what knows all others comes first."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    contract = project["tool"]["importlinter"]["contracts"][0]
+    layer_of_room = {}
+    for number, layer in enumerate(reversed(contract["layers"])):
+        for room in layer.split(" | "):
+            layer_of_room[room] = number
     rooms = _rooms_of_the_table()
-    assert [place[room] for room in rooms] == sorted(place[room] for room in rooms)
+    assert rooms == sorted(rooms, key=lambda room: layer_of_room[room])
 
 
 def test_contributing_gives_a_reason_for_every_entry_at_the_top() -> None:
-    _, _, table = CONTRIBUTING.partition("| entry | reason |")
-    named = set(
-        re.findall(
-            r"`([\w.]+)`", "".join(re.findall(r"(?m)^\| (`[^|]+) \|", table.split("\n\n")[0]))
-        )
-    )
-    listed = subprocess.run(
-        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout
-    assert named == {file.partition("/")[0] for file in listed.splitlines()}
+    entries = re.findall(r"`([\w.]+)`", "".join(_first_cells("| entry | reason |")))
+    command = ["git", "ls-files"]
+    files = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert set(entries) == {file.partition("/")[0] for file in files.splitlines()}
 
 
 def test_places_that_contributing_names_exist() -> None:
+    """More than 50 are named."""
     places = set(re.findall(r"`((?:walkers|studies|tests|docs)/[\w./-]+)`", CONTRIBUTING))
     assert len(places) > 50
-    assert not sorted(place for place in places if not (ROOT / place).exists())
+    for place in places:
+        assert (ROOT / place).exists(), place
