@@ -1,4 +1,4 @@
-"""README and docs/ are up to date: links, pictures, outputs, numbers in sentences, keys, examples."""
+"""README and docs/ are up to date: links, names, pictures, outputs, numbers, examples."""
 
 from __future__ import annotations
 
@@ -49,25 +49,41 @@ def prose(page: Path) -> str:
 
 @cache
 def anchors(page: Path) -> set[str]:
-    """As GitHub and myst make them of headings: lower case, hyphens for blanks, no punctuation."""
-    titles = (
-        re.sub(r"[`*]|\[([^\]]*)\]\([^)]*\)", r"\1", title)
-        for title in _HEADING.findall(prose(page))
-    )
-    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+    """Anchors of headings, as GitHub and myst make them.
+
+    They have lower case, hyphens for blanks, and no punctuation.
+    """
+    names = set()
+    for heading in _HEADING.findall(prose(page)):
+        title = re.sub(r"[`*]|\[([^\]]*)\]\([^)]*\)", r"\1", heading)
+        letters = re.sub(r"[^\w\- ]", "", title.lower())
+        names.add(letters.replace(" ", "-"))
+    return names
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def leads_somewhere(link: str, page: Path) -> bool:
+    """Whether a link of a page is an address, or the name of a file and one of its headings."""
+    if re.match(r"[a-z]+:", link):
+        return True
+    name, _, anchor = link.partition("#")
+    target = page
+    if name:
+        target = (page.parent / name).resolve()
+    return target.exists() and (not anchor or anchor in anchors(target))
+
+
+def path_in_project(path: Path) -> str:
+    return path.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=path_in_project)
 def test_links_of_a_page_lead_somewhere(page: Path) -> None:
     missing = []
-    for link in (groups[0] or groups[1] for groups in _LINK.findall(_CODE.sub("", prose(page)))):
-        name, _, anchor = link.partition("#")
-        target = (page.parent / name).resolve() if name else page
-        known = re.match(r"[a-z]+:", link) or (
-            target.exists() and (not anchor or anchor in anchors(target))
-        )
-        missing += [] if known else [link]
-    assert not missing
+    for of_text, of_picture in _LINK.findall(_CODE.sub("", prose(page))):
+        link = of_text or of_picture
+        if not leads_somewhere(link, page):
+            missing.append(link)
+    assert missing == []
 
 
 _NAME = re.compile(r"(?<!`)`([A-Za-z_][\w.]*)`(?!`)")
@@ -77,65 +93,90 @@ _FILES = ("pvd", "parquet", "sif", "def", "css")
 _ERRORS = ("walkers.errors.", "walkers.runner.failures.")
 
 
-def is_there(name: str) -> bool:
-    """Whether a dotted name is that of a module, or of an attribute of one; fields of a dataclass are annotations."""
+def exists(name: str) -> bool:
+    """Whether a dotted name is that of a module, or of an attribute of one.
+
+    Fields of a dataclass are annotations.
+    """
     parts = name.split(".")
     for count in range(len(parts), 0, -1):
         with suppress(ImportError):
-            holder: object = import_module(".".join(parts[:count]))
+            owner: object = import_module(".".join(parts[:count]))
             for part in parts[count:]:
-                if not hasattr(holder, part):
-                    return part in getattr(holder, "__annotations__", {})
-                holder = getattr(holder, part)
+                if not hasattr(owner, part):
+                    return part in getattr(owner, "__annotations__", {})
+                owner = getattr(owner, part)
             return True
     return False
 
 
-def test_names_in_docstrings_are_there() -> None:
-    """Those in backquotes: names in the code of the file, of a module beside it, of an error, or a full path."""
-    wrong, count = [], 0
-    for file in sorted([*(ROOT / "walkers").rglob("*.py"), *(ROOT / "studies").rglob("*.py")]):
+def names_in_code(tree: ast.Module) -> set[str | None]:
+    """Names in the code of a module: variables, attributes, arguments, functions and classes."""
+    names = set()
+    for node in ast.walk(tree):
+        for field in ("id", "attr", "arg", "name"):
+            names.add(getattr(node, field, None))
+    return names
+
+
+def names_in_docstrings(tree: ast.Module) -> list[str]:
+    """Names in backquotes in the docstrings of a module."""
+    names = []
+    for node in ast.walk(tree):
+        match node:
+            case ast.Expr(value=ast.Constant(value=str(text))):
+                names += _NAME.findall(text)
+    return names
+
+
+def exists_for(name: str, module: str) -> bool:
+    """Whether a name exists as it is, in a module, beside it, among the errors, or in Python."""
+    package = module.rpartition(".")[0]
+    for home in ("", f"{module}.", f"{package}.", "builtins.", *_ERRORS):
+        if exists(f"{home}{name}"):
+            return True
+    return False
+
+
+@pytest.mark.parametrize(("folder", "at_least"), [("walkers", 300), ("studies", 5)])
+def test_names_in_docstrings_are_there(folder: str, at_least: int) -> None:
+    """In the code of the file, of a module beside it or of an error, or by a full path."""
+    missing = []
+    number = 0
+    for file in sorted((ROOT / folder).rglob("*.py")):
         module = ".".join(file.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
-        homes = ("", f"{module}.", f"{module.rpartition('.')[0]}.", "builtins.", *_ERRORS)
-        nodes = [*ast.walk(ast.parse(file.read_text("utf-8")))]
-        code = {
-            getattr(node, field, None) for node in nodes for field in ("id", "attr", "arg", "name")
-        }
-        texts = [
-            node.value.value
-            for node in nodes
-            if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-        ]
-        for name in (name for text in texts for name in _NAME.findall(str(text))):
-            count += 1
-            if not ({*name.split(".")} <= code or any(is_there(f"{home}{name}") for home in homes)):
-                wrong.append(f"{file.relative_to(ROOT)}: {name}")
-    assert count > 300
-    assert not wrong
+        tree = ast.parse(file.read_text("utf-8"))
+        code = names_in_code(tree)
+        for name in names_in_docstrings(tree):
+            number += 1
+            if not (set(name.split(".")) <= code or exists_for(name, module)):
+                missing.append(f"{path_in_project(file)}: {name}")
+    assert number > at_least
+    assert missing == []
+
+
+def files_for_readers() -> list[Path]:
+    """Pages, and the templates of pages and reports."""
+    files = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
+    for pattern in ("walkers/**/*.j2", "studies/**/*.j2", "studies/*.md"):
+        files += ROOT.glob(pattern)
+    for pattern in ("**/*.md", "**/*.rst"):
+        files += DOCS.glob(pattern)
+    return files
 
 
 def test_names_of_the_package_on_pages_and_in_templates_are_there() -> None:
-    places = {
-        ROOT: (
-            "README.md",
-            "CONTRIBUTING.md",
-            "walkers/**/*.j2",
-            "studies/**/*.j2",
-            "studies/*.md",
-        ),
-        DOCS: ("**/*.md", "**/*.rst"),
-    }
-    files = [
-        file for folder, kinds in places.items() for kind in kinds for file in folder.glob(kind)
-    ]
-    found = {
-        (file, name) for file in files for name in _OF_PACKAGE.findall(file.read_text("utf-8"))
-    }
-    named = {(file, name) for file, name in found if name.split(".")[1] not in _FILES}
-    assert len(named) > 10
-    assert not sorted(
-        f"{file.relative_to(ROOT)}: {name}" for file, name in named if not is_there(name)
-    )
+    number = 0
+    missing = []
+    for file in files_for_readers():
+        for name in set(_OF_PACKAGE.findall(file.read_text("utf-8"))):
+            if name.split(".")[1] in _FILES:
+                continue
+            number += 1
+            if not exists(name):
+                missing.append(f"{path_in_project(file)}: {name}")
+    assert number > 10
+    assert missing == []
 
 
 def test_no_picture_or_table_is_of_other_parameters_than_todays() -> None:
@@ -143,24 +184,24 @@ def test_no_picture_or_table_is_of_other_parameters_than_todays() -> None:
     assert stale(DOCS) == {}
 
 
-@pytest.mark.parametrize(
-    "page",
-    [page for page in PAGES if "<!--fact " in prose(page) or "<!--output-->" in prose(page)],
-    ids=lambda page: page.name,
-)
+def has_outputs(page: Path) -> bool:
+    """Whether a page has numbers or outputs that the program fills in."""
+    return "<!--fact " in prose(page) or "<!--output-->" in prose(page)
+
+
+@pytest.mark.parametrize("page", list(filter(has_outputs, PAGES)), ids=path_in_project)
 def test_numbers_and_outputs_on_pages_are_todays(
     page: Path, once: Callable[[str, Callable[[Path], object]], Path]
 ) -> None:
+    """Several pages show the same command, which runs once."""
+
     def printed(command: str) -> str:
         def print_it(folder: Path) -> None:
-            (folder / "printed.txt").write_text(
-                output_of(command, folder / "runs"), encoding="utf-8"
-            )
+            output = output_of(command, folder / "runs")
+            (folder / "printed.txt").write_text(output, encoding="utf-8")
 
-        # Several pages show the same command.
-        return (
-            once(f"output-{sha256(command.encode()).hexdigest()[:12]}", print_it) / "printed.txt"
-        ).read_text()
+        name = f"output-{sha256(command.encode()).hexdigest()[:12]}"
+        return (once(name, print_it) / "printed.txt").read_text("utf-8")
 
     text = page.read_text("utf-8")
     assert without_hashes(refreshed(text, facts(DOCS), printed)) == without_hashes(text)
@@ -173,13 +214,10 @@ def test_examples_give_what_they_say(
     module: str, runs_folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In a folder of the tests (``tmp``), with what a user would have imported."""
-    if (
-        module == "walkers.api"
-    ):  # its sweep is there for its table: Fig. 4b would take all of 60 cycles
-        monkeypatch.setattr("walkers.inputs.resolving.length._MOST_CYCLES", 12)
-    failed, tried = doctest.testmod(
-        import_module(module), extraglobs={"tmp": runs_folder, "walkers": walkers}
-    )
+    # The sweep of `walkers.api` is there for its table: Fig. 4b would take all of 60 cycles.
+    monkeypatch.setattr("walkers.inputs.resolving.length._MOST_CYCLES", 12)
+    names = {"tmp": runs_folder, "walkers": walkers}
+    failed, tried = doctest.testmod(import_module(module), extraglobs=names)
     assert tried
     assert not failed
 
@@ -191,58 +229,77 @@ def test_generated_pages_of_the_reference_are_todays(name: str) -> None:
 
 
 def test_the_page_of_the_comparison_is_of_todays_template() -> None:
-    """Its sentences say when a fact agrees: `walkers.calibration.observations.Observation.agrees`."""
+    """Its sentences say when a fact agrees, as `Observation.agrees` decides."""
     page = DOCS / "figures" / "comparison.md"
     compared = read_json(page.with_suffix(".json"))
     assert page.read_text("utf-8") == rendered("studies.paper", "comparison.md.j2", compared)
 
 
 def test_the_table_of_performance_is_the_benchmarks() -> None:
-    """`make bench` keeps the ratios."""
+    """`make bench` keeps the ratios; the page has one digit after the point."""
     page = (DOCS / "explanation" / "performance.md").read_text("utf-8")
-    told = [float(number) for number in re.findall(r"beads \| ([\d.]+) \|", page)]
-    ratios = [
-        deck["minimal"] for deck in read_json(ROOT / "tests" / "benchmark_ratios.json").values()
-    ]
-    assert told == pytest.approx(ratios, abs=0.06)
+    printed = [float(number) for number in re.findall(r"beads \| ([\d.]+) \|", page)]
+    benchmarks = read_json(ROOT / "tests" / "benchmark_ratios.json")
+    ratios = [deck["minimal"] for deck in benchmarks.values()]
+    assert printed == pytest.approx(ratios, abs=0.06)
 
 
 def test_the_first_velocity_stands_beside_the_curve_of_the_paper() -> None:
     text = " ".join((ROOT / "README.md").read_text("utf-8").split())
-    velocity = float(re.search(r"velocity along the heading +([\d.]+) mm/s", text)[1])
-    curve = 1e3 * predicted_column([load_case("fig1b")], "velocity")[0][PAPER_FIT][0]
-    assert f"{100.0 * (velocity / curve - 1.0):.0f} % above the curve" in text
+    printed = re.search(r"velocity along the heading +([\d.]+) mm/s", text)
+    assert printed is not None
+    by_model, _ = predicted_column([load_case("fig1b")], "velocity")
+    curve = 1e3 * by_model[PAPER_FIT][0]
+    excess = 100.0 * (float(printed[1]) / curve - 1.0)
+    assert f"{excess:.0f} % above the curve" in text
     assert f"({curve:.2f} mm/s at this drive, no measured point)" in text
 
 
 def test_symbols_of_clusters_are_filled_by_how_many_stay_upright() -> None:
+    """Of six walkers at each of three points, 6, 1 and none stay upright."""
     figure = Figure()
     axes = figure.subplots()
     axes.errorbar([0.0, 1.0, 2.0], [3.0, 4.0, 5.0], marker="o", ls="none")
     mark_upright(figure, pd.DataFrame({"upright": [6, 1, 0], "walkers": 6}))
-    shown = {line.get_label(): line for line in axes.lines if line.get_marker() == "o"}
-    assert {label: line.get_fillstyle() for label, line in shown.items()} == {
-        "all upright": "full",
-        "some upright": "left",
-        "none upright": "none",
-    }
-    assert [list(line.get_ydata()) for line in shown.values()] == [[3.0], [4.0], [5.0]]
+    symbols = []
+    for line in axes.lines:
+        if line.get_marker() == "o":
+            symbols.append((line.get_label(), line.get_fillstyle(), list(line.get_ydata())))
+    assert symbols == [
+        ("all upright", "full", [3.0]),
+        ("some upright", "left", [4.0]),
+        ("none upright", "none", [5.0]),
+    ]
+
+
+def imported_from_package(tree: ast.Module) -> set[str]:
+    """Modules of the package that a module imports."""
+    modules: set[str | None] = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.ImportFrom(module=module):
+                modules.add(module)
+            case ast.Import(names=names):
+                for alias in names:
+                    modules.add(alias.name)
+    return {module for module in modules if module and module.split(".")[0] == "walkers"}
+
+
+def used_names(tree: ast.Module) -> set[str]:
+    """Names of the package that a module uses as ``walkers.NAME``."""
+    names = set()
+    for node in ast.walk(tree):
+        match node:
+            case ast.Attribute(value=ast.Name(id="walkers"), attr=name):
+                names.add(name)
+    return names
 
 
 @pytest.mark.parametrize(
     "path", sorted((DOCS / "examples").glob("*.py")), ids=lambda path: path.stem
 )
 def test_examples_of_the_gallery_use_public_names_alone(path: Path) -> None:
-    """Laws of bridges, in texts that an example writes, are not looked at; the site's build runs each example."""
+    """Except in the texts of bridge laws that they write. The site's build runs each example."""
     tree = ast.parse(path.read_text("utf-8"))
-    imported = [one.module for one in ast.walk(tree) if isinstance(one, ast.ImportFrom)]
-    imported += [
-        name.name for one in ast.walk(tree) if isinstance(one, ast.Import) for name in one.names
-    ]
-    assert {name for name in imported if name and name.split(".")[0] == "walkers"} == {"walkers"}
-    used = [
-        one
-        for one in ast.walk(tree)
-        if isinstance(one, ast.Attribute) and isinstance(one.value, ast.Name)
-    ]
-    assert {one.attr for one in used if one.value.id == "walkers"} <= set(walkers.__all__)
+    assert imported_from_package(tree) == {"walkers"}
+    assert used_names(tree) <= set(walkers.__all__)
