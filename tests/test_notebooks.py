@@ -1,4 +1,4 @@
-"""Notebooks in a JupyterLab, driven by Debian's Chromium: an example of the gallery, and the values of cells."""
+"""Notebooks: the values of cells, also in a JupyterLab that Debian's Chromium drives."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import subprocess
 import sys
 from base64 import b64decode
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -20,101 +21,149 @@ from walkers.api import Pictures
 from walkers.files import read_json
 
 EXAMPLE = Path(__file__).parents[1] / "docs" / "examples" / "01_first_walk.py"
-CELLS = {
+SWEEP = """\
+axes = {'drive.frequency': ['70 Hz', '80 Hz']}
+sweep = walkers.sweep({'case': 'fig1b', 'axes': axes})
+sweep
+"""
+TEXTS = {
     "import walkers\ncase = walkers.load_case('fig1b')\ncase": "chromium-coated glass",
     "run = walkers.run('pile-ci')\nrun": "clusters freed",
     "run.table('bed')": "brazil_nut",
-    "sweep = walkers.sweep({'case': 'fig1b', 'axes': {'drive.frequency': ['70 Hz', '80 Hz']}})\nsweep": "finished",
-    "run.plot()": "<img>",
-    "sweep.figure()": "<img>",
-    "run.view(height=300)": "<canvas>",
+    SWEEP: "finished",
 }
-"""Cells, and what they show: a word of a table, or an element that is drawn."""
+"""Cells whose value is a table, and a text in it."""
+ELEMENTS = {"run.plot()": "img", "sweep.figure()": "img", "run.view(height=300)": "canvas"}
+"""Cells whose value is drawn, and the element of the page."""
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """A JupyterLab: the folder with its notebooks, and its address."""
+
+    folder: Path
+    address: str
 
 
 @pytest.fixture(scope="module")
-def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, str]]:
-    """The folder of a JupyterLab, and its address."""
+def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Laboratory]:
+    """A JupyterLab that runs during the tests of the module."""
+    pytest.importorskip("jupyterlab", reason="`make test-slow` installs JupyterLab")
     folder = tmp_path_factory.mktemp("laboratory")
-    options = [
+    command = [
+        sys.executable,
+        "-m",
+        "jupyterlab",
         "--allow-root",
         "--no-browser",
         "--port=0",
         "--IdentityProvider.token=",
         "--LabApp.news_url=None",
+        f"--ServerApp.root_dir={folder}",
     ]
-    places = {f"JUPYTER_{name}_DIR": str(folder / name) for name in ("CONFIG", "DATA", "RUNTIME")}
-    command = [sys.executable, "-m", "jupyterlab", *options, f"--ServerApp.root_dir={folder}"]
+    environment = os.environ | {
+        "JUPYTER_CONFIG_DIR": str(folder / "config"),
+        "JUPYTER_DATA_DIR": str(folder / "data"),
+        "JUPYTER_RUNTIME_DIR": str(folder / "runtime"),
+    }
     with (folder / "log").open("w") as log:
-        server = subprocess.Popen(
-            command, cwd=folder, env=os.environ | places, stdout=log, stderr=log
-        )
-    record = wait_for(lambda: next(folder.glob("RUNTIME/jpserver-*.json"), None))
-    yield folder, wait_for(lambda: record.read_text().endswith("}") and read_json(record)["url"])
+        server = subprocess.Popen(command, cwd=folder, env=environment, stdout=log, stderr=log)
+
+    def address() -> str | None:
+        """The address, as soon as the server has written its record completely."""
+        for record in folder.glob("runtime/jpserver-*.json"):
+            if record.read_text().endswith("}"):
+                return str(read_json(record)["url"])
+        return None
+
+    yield Laboratory(folder, wait_for(address))
     server.terminate()
     server.wait()
 
 
-def run_all(page: Page, address: str, notebook: Path) -> set[str]:
-    """Open a notebook and run its cells, none of which may fail; the progress bars on the way."""
-    cells = sum(cell["cell_type"] == "code" for cell in read_json(notebook)["cells"])
-    page.goto(f"{address}doc/tree/{notebook.name}")
+def run_all_cells(page: Page, laboratory: Laboratory, notebook: str) -> set[str]:
+    """Open a notebook and run its cells, none of which may fail.
+
+    Returns the progress bars that were shown on the way.
+    """
+    contents = read_json(laboratory.folder / notebook)
+    cell_types = [cell["cell_type"] for cell in contents["cells"]]
+    page.goto(f"{laboratory.address}doc/tree/{notebook}")
     page.wait_for_selector(".jp-CodeCell")
     prompts = page.locator(".jp-CodeCell .jp-InputPrompt")
-    wait_for(lambda: prompts.count() == cells)  # the menu runs the cells that exist
+    # The menu runs the cells that exist.
+    wait_for(lambda: prompts.count() == cell_types.count("code"))
     page.get_by_role("menuitem", name="Run", exact=True).click()
     page.get_by_text("Run All Cells", exact=True).click()
     bars = set[str]()
 
     def ended() -> bool:
+        """Whether each cell has a number; running ones have a star."""
         bars.update(re.findall("━[━─]+", page.locator(".jp-Notebook").inner_text()))
-        numbers = [text.strip("[]: ") for text in prompts.all_text_contents()]
-        return all(number.isdigit() for number in numbers)
+        return all(prompt.strip("[]: ").isdigit() for prompt in prompts.all_text_contents())
 
     wait_for(ended)
     assert page.locator("[data-mime-type='application/vnd.jupyter.error']").count() == 0
     return bars
 
 
-def test_the_value_of_a_cell_contains_its_pictures(walked_run: Path, tmp_path: Path) -> None:  # noqa: F811
+def test_the_value_of_a_cell_contains_its_pictures(
+    walked_run: Path,  # noqa: F811
+    tmp_path: Path,
+) -> None:
+    """A run of walkers has two."""
     pictures = walkers.load(walked_run).plot(tmp_path)
     contents = re.findall('src="data:image/png;base64,([^"]+)"', pictures._repr_html_())
-    assert [b64decode(content) for content in contents] == [path.read_bytes() for path in pictures]
     assert len(pictures) == 2
+    for content, path in zip(contents, pictures, strict=True):
+        assert b64decode(content) == path.read_bytes()
 
 
 def test_pictures_of_a_cell_have_the_format_of_their_file(tmp_path: Path) -> None:
     """A browser shows no SVG that is called a PNG."""
-    pictures = Pictures(tmp_path / name for name in ("a.png", "b.svg"))
+    pictures = Pictures([tmp_path / "a.png", tmp_path / "b.svg"])
     for path in pictures:
         path.write_bytes(b"")
     assert re.findall("data:([^;]+);", pictures._repr_html_()) == ["image/png", "image/svg+xml"]
 
 
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:  # noqa: F811
+    """A page that is high enough for all cells: those out of sight are not drawn."""
+    page = browser.new_page(viewport={"width": 1000, "height": 6000})
+    yield page
+    page.close()
+
+
 @pytest.mark.slow
-def test_notebooks_run_in_jupyterlab_and_show_tables_figures_and_beads(
-    laboratory: tuple[Path, str],
-    browser: Browser,  # noqa: F811
-) -> None:
-    import nbformat
+def test_an_example_of_the_gallery_runs_in_jupyterlab(laboratory: Laboratory, page: Page) -> None:
     from sphinx_gallery.notebook import python_to_jupyter_cli
 
-    folder, address = laboratory
-    (folder / EXAMPLE.name).write_text(EXAMPLE.read_text("utf-8"), "utf-8")
-    python_to_jupyter_cli([str(folder / EXAMPLE.name)])
-    cells = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(text) for text in CELLS])
-    cells.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3"}
-    nbformat.write(cells, folder / "cells.ipynb")
-
-    page = browser.new_page(
-        viewport={"width": 1000, "height": 6000}
-    )  # cells out of sight are not drawn
-    run_all(page, address, folder / f"{EXAMPLE.stem}.ipynb")
+    script = laboratory.folder / EXAMPLE.name
+    script.write_text(EXAMPLE.read_text("utf-8"), "utf-8")
+    python_to_jupyter_cli([str(script)])
+    run_all_cells(page, laboratory, f"{EXAMPLE.stem}.ipynb")
     assert page.locator(".jp-OutputArea img").count() == 1
-    assert len(run_all(page, address, folder / "cells.ipynb")) > 1
-    for cell, shown in zip(page.locator(".jp-CodeCell").all(), CELLS.values(), strict=True):
-        output = cell.locator(".jp-OutputArea")
-        if shown.startswith("<"):
-            output.locator(shown.strip("<>")).first.wait_for()
-        else:
-            assert shown in output.inner_text()
+
+
+@pytest.mark.slow
+def test_notebooks_show_tables_figures_beads_and_progress(
+    laboratory: Laboratory, page: Page
+) -> None:
+    import nbformat
+
+    cells = []
+    for text in [*TEXTS, *ELEMENTS]:
+        cells.append(nbformat.v4.new_code_cell(text))
+    notebook = nbformat.v4.new_notebook(cells=cells)
+    notebook.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3"}
+    nbformat.write(notebook, laboratory.folder / "cells.ipynb")
+
+    bars = run_all_cells(page, laboratory, "cells.ipynb")
+    assert len(bars) > 1
+    code_cells = page.locator(".jp-CodeCell")
+    for number, text in enumerate(TEXTS.values()):
+        assert text in code_cells.nth(number).locator(".jp-OutputArea").inner_text()
+    for number, element in enumerate(ELEMENTS.values(), start=len(TEXTS)):
+        output = code_cells.nth(number).locator(".jp-OutputArea")
+        output.locator(element).first.wait_for()
