@@ -18,6 +18,7 @@ LICENCE_OF_PYTHON = PROJECT["license"].split(" AND ")[0]
 
 
 def _match(pattern: str, file: str) -> str:
+    """The first group of a pattern in a file of the project."""
     match = re.search(pattern, (ROOT / file).read_text("utf-8"), re.MULTILINE)
     assert match, f"{pattern} is not in {file}"
     return match[1]
@@ -39,6 +40,7 @@ def test_name_version_and_licence_are_the_same_everywhere(
 
 
 def test_a_container_has_the_version_of_the_package() -> None:
+    """The Dockerfile reads it with a command, which is run here."""
     command = _match(r"version=\$\((.*)\)", "Dockerfile")
     printed = subprocess.run(
         command, shell=True, cwd=ROOT, capture_output=True, text=True, check=True
@@ -57,10 +59,18 @@ def test_the_site_is_built_with_the_packages_of_the_makefile() -> None:
     assert packages == _match("^ENGINE := (.*)", "Makefile").split()
 
 
-@pytest.mark.parametrize("room", ["inputs", "templates", "runner", "postprocess"])
-def test_a_link_at_the_top_refuses_to_be_a_second_copy_of_a_package(room: str) -> None:
+ROOMS = ["inputs", "templates", "runner", "postprocess"]
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_link_at_the_top_leads_to_its_room(room: str) -> None:
     assert (ROOT / room).resolve() == ROOT / "walkers" / room
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_link_at_the_top_refuses_to_be_a_second_copy_of_a_package(room: str) -> None:
     command = [sys.executable, "-c", f"import walkers.{room}; import {room}"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
     message = f"ImportError: {room} is a link to the package walkers.{room}: import walkers.{room}"
-    assert (done.returncode, done.stderr.splitlines()[-1]) == (1, message)
+    assert done.stderr.splitlines()[-1] == message
