@@ -1323,6 +1323,7 @@ def test_a_name_of_another_kind(command: str, message: str) -> None:
         ("export --to deck {sweep}", "is a sweep's directory: walkers list"),
         ("render {sweep}", "is a sweep: expected one of its runs"),
         ("climb {sweep}", "expected a finished run of a pile"),
+        ("export {sweep} --to archive --every 2", "--every: is for --to vtk, lammps"),
     ],
 )
 def test_the_directory_of_a_sweep_in_place_of_a_run(

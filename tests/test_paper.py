@@ -59,7 +59,7 @@ CHANGES: dict[str, dict[str, Any]] = {
 }
 """Values in place of the `SHORT` ones, by sweep."""
 SHORT_DESCENT = {"from": "1.4 g", "to": "0.4 g", "step": "0.2 g"}
-FACTS = list(map(of_facts, sets()))
+FACTS = list(map(facts_sweep_name, parameter_sets()))
 """Names of the sweeps of all experiments of the calibration, one for each parameter set."""
 
 
@@ -105,7 +105,7 @@ def sources(once: FillOnce) -> Sources:
         for name in FACTS:
             sweep = shortened_facts(name, out)
             write_record(plan_sweep(sweep, out, SweepOptions(1)).record)
-            if name == of_facts("shipped"):
+            if name == facts_sweep_name("shipped"):
                 run_shortened(sweep, out)
 
     return Sources(once("paper", run))
@@ -176,7 +176,9 @@ def test_theory_says_where_the_paper_measured_nothing(changes: dict[str, str], l
 def test_the_parameter_set_called_shipped_is_that_of_the_shipped_cases(
     experiment: str, name: str
 ) -> None:
-    cases = dict(zip(ruby().experiments, sweep_of(of_facts("shipped")).cases(), strict=True))
+    cases = dict(
+        zip(ruby().experiments, sweep_of(facts_sweep_name("shipped")).cases(), strict=True)
+    )
     assert_same_physics(cases[experiment], load_case(name))
 
 
@@ -195,7 +197,7 @@ def assert_same_physics(case: Case, shipped_case: Case) -> None:
 @pytest.fixture(scope="session")
 def quantities(sources: Sources) -> dict[str, dict[str, float]]:
     """Quantities of the runs with the shipped parameters, by experiment."""
-    runs = sources.table(of_facts("shipped"))["run"]
+    runs = sources.table(facts_sweep_name("shipped"))["run"]
     measured = {}
     for label, run in zip(ruby().experiments, runs, strict=True):
         measured[label] = quantities_of_run(run)
@@ -206,7 +208,7 @@ def test_facts_and_sets_are_those_of_the_calibration(
     facts: dict[str, dict[str, Any]], compared: dict[str, Any]
 ) -> None:
     assert list(facts) == [observation.name for observation in ruby().file.observations]
-    assert list(compared["sets"]) == list(sets())
+    assert list(compared["sets"]) == list(parameter_sets())
 
 
 def test_a_velocity_is_judged_by_the_run_of_its_set_in_mm_per_s(

@@ -125,7 +125,7 @@ def bench(in_folder: Path) -> Iterator[experiments.Bench]:
 
 
 def test_experiments_of_others_about_a_thrown_bead_pass(bench: experiments.Bench) -> None:
-    assert verdicts_of(experiments.thrown(bench)) == [Verdict.PASS, Verdict.PASS]
+    assert verdicts_of(experiments.thrown_bead(bench)) == [Verdict.PASS, Verdict.PASS]
 
 
 def test_experiments_of_others_about_a_wet_incline_pass(bench: experiments.Bench) -> None:
@@ -136,8 +136,8 @@ def test_experiments_of_others_about_the_drift_of_a_dry_bead_are_as_modelled(
     bench: experiments.Bench,
 ) -> None:
     """At one phase of the second tone, 60°."""
-    drift = experiments.slider(bench, 60.0)
-    assert drift == pytest.approx(experiments.modelled(60.0), abs=5e-3)
+    drift = experiments.measured_drift(bench, 60.0)
+    assert drift == pytest.approx(experiments.coulomb_drift(60.0), abs=5e-3)
 
 
 @pytest.fixture(scope="module")
@@ -185,7 +185,7 @@ def test_a_thrown_bead_with_twice_the_friction_rolls_too_soon(
     twice_the_friction: None, bench: experiments.Bench
 ) -> None:
     """The speed at which it rolls, 5/7 of that of the throw, does not depend on friction."""
-    speed, time = experiments.thrown(bench)
+    speed, time = experiments.thrown_bead(bench)
     assert speed.verdict is Verdict.PASS
     assert time.verdict is Verdict.FAIL
 
@@ -193,7 +193,7 @@ def test_a_thrown_bead_with_twice_the_friction_rolls_too_soon(
 def test_a_dry_bead_with_twice_the_friction_does_not_drift_as_modelled(
     twice_the_friction: None, bench: experiments.Bench
 ) -> None:
-    difference = experiments.slider(bench, 90.0) - experiments.modelled(90.0)
+    difference = experiments.measured_drift(bench, 90.0) - experiments.coulomb_drift(90.0)
     assert np.abs(difference).max() > 0.05
 
 
@@ -286,14 +286,14 @@ def test_the_farthest_bead_of_a_pile_that_leaves_its_motion_is_not_judged(
 
 
 def test_the_largest_difference_has_either_sign() -> None:
-    line = largest("x", np.array([0.01, -0.1, 0.02]), 0.05, np.arange(3.0))
+    line = largest_difference("x", np.array([0.01, -0.1, 0.02]), 0.05, np.arange(3.0))
     assert line.measured == -0.1
     assert line.verdict is Verdict.FAIL
     assert "at 1, " in line.quantity
 
 
 def test_the_largest_difference_of_either_sign_may_be_within_the_tolerance() -> None:
-    assert largest("x", np.array([0.01, -0.04]), 0.05).verdict is Verdict.PASS
+    assert largest_difference("x", np.array([0.01, -0.04]), 0.05).verdict is Verdict.PASS
 
 
 REPORTS = Path(__file__).resolve().parents[1] / "docs" / "engine-reports"
