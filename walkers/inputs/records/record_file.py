@@ -195,7 +195,7 @@ def _columns_of(heads: Sequence[str]) -> tuple[list[_Column], list[str]]:
             ignored.append(head or f"number {number + 1}")
             continue
         factor = _factor_of(head, unit, TIME if place == 0 else ACCELERATION)
-        columns.append(_Column(number=number, place=place, factor=factor, head=head))
+        columns.append(_Column(index=number, place=place, factor=factor, head=head))
     return columns, ignored
 
 
