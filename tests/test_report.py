@@ -548,13 +548,17 @@ def picture(page: Page) -> bytes:
     return page.locator(".scene:visible canvas").first.screenshot()
 
 
+def wait_for_frames(page: Page) -> None:
+    """Wait for eight frames, however long they take: Playwright asks once a frame."""
+    page.wait_for_function("() => (window.drawn = (window.drawn ?? 0) + 1) % 8 === 0")
+
+
 def rested_picture(page: Page, *others: bytes) -> bytes:
     """The picture as soon as it is none of others and frames change it no more."""
 
     def unchanged_picture() -> bytes | None:
         before = picture(page)
-        # Playwright asks once a frame: eight of them, however long they take.
-        page.wait_for_function("() => (window.drawn = (window.drawn ?? 0) + 1) % 8 === 0")
+        wait_for_frames(page)
         if before not in others and picture(page) == before:
             return before
         return None
@@ -622,8 +626,9 @@ def test_a_sweeps_point_opens_a_report_whose_beads_play_and_pause(
     expect(play).to_have_text("Pause")
     wait_for(lambda: picture(page) != start)
     time_of_pause = wait_for(lambda: pause(page))
-    rested_picture(page, start)
+    wait_for_frames(page)
     assert time.text_content() == time_of_pause
+    rested_picture(page, start)
 
 
 def test_beads_of_a_report_turn_with_the_mouse_and_back(
@@ -633,6 +638,8 @@ def test_beads_of_a_report_turn_with_the_mouse_and_back(
     second_run = Path(load_table(swept)["run"][1]).name
     page = visit(swept.parent / second_run / "report.html")
     page.wait_for_selector(".scene[data-ready]")
+    as_at_first = page.get_by_role("button", name="as at first")
+    as_at_first.click()
     start = rested_picture(page)
 
     def turned_picture() -> bytes | None:
@@ -641,7 +648,7 @@ def test_beads_of_a_report_turn_with_the_mouse_and_back(
         after = rested_picture(page)
         return None if after == start else after
 
-    turned = wait_for(turned_picture)
+    wait_for(turned_picture)
     assert page.locator(".time").text_content() == "0.0000 s"
-    page.get_by_role("button", name="as at first").click()
-    rested_picture(page, turned)
+    as_at_first.click()
+    wait_for(lambda: picture(page) == start)
