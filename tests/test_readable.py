@@ -167,11 +167,13 @@ def test_code_is_not_dense(folder: str) -> None:
 
 def _bags(tree: ast.Module) -> Iterator[str]:
     """Public functions and methods of a module that take any keyword argument."""
-    for node in ast.walk(tree):
-        match node:
-            case ast.FunctionDef(name=name, args=ast.arguments(kwarg=ast.arg())):
-                if not name.startswith("_"):
-                    yield name
+    classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+    for scope in (tree, *classes):
+        for node in scope.body:
+            match node:
+                case ast.FunctionDef(name=name, args=ast.arguments(kwarg=ast.arg())):
+                    if not name.startswith("_"):
+                        yield name
 
 
 def test_public_functions_name_their_arguments() -> None:
