@@ -6,6 +6,7 @@ import json
 import re
 import sys
 import tomllib
+from copy import deepcopy
 from dataclasses import replace
 from math import pi
 from pathlib import Path
@@ -738,3 +739,11 @@ def test_beads_that_are_heavier_than_the_force_of_their_bridge_alone_are_reporte
     """The weight grows as R³ and the force as R: for ruby in silicone oil they equal at 1.2 mm."""
     case = load_case("fig1b", {"dimers.radii": [f"{radius_mm} mm", "1 mm"]})
     assert len(gravity_warnings(case)) == warnings
+
+
+def test_a_case_keeps_its_tables_if_the_caller_changes_them() -> None:
+    tables = deepcopy(document())
+    del tables["contact"]["rolling_friction"]
+    case = load_case(tables)
+    tables["contact"]["rolling_friction"] = 0.02
+    assert origins(case)["contact.rolling_friction"].word != "given"

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from contextlib import suppress
+from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,7 +71,7 @@ def load_case(
     (0.0003, 0.00025)
     """
     if isinstance(case, Mapping):
-        document: Mapping[str, Any] = case
+        document: Mapping[str, Any] = deepcopy(case)  # the caller may change its tables later
         source = "<case>"
         name = "case"
     else:
