@@ -1021,7 +1021,7 @@ def sweep(
     EngineFailure
         If there is no engine, or its audit failed.
     SweepStopped
-        If a failure hits every point.
+        If a failure affects every point.
 
     Examples
     --------

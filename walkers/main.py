@@ -197,7 +197,7 @@ def _plain(text: Any) -> str:
 
 
 def program() -> App:
-    """The program. A command is imported when it is called."""
+    """The program with all of its commands. A command is imported when it is called."""
     app = new_app("walkers", _SUMMARY)
     for command in ALL_COMMANDS:
         app.command(command.place, name=command.name, help=command.summary)

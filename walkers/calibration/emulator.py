@@ -52,8 +52,8 @@ def distances(observation: Observation, numbers: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray, shape (P,)
-        Distances in deviations, at most `LARGEST_DISTANCE`. A number that does not exist has the
-        largest distance, on the side where no limit allows it.
+        Distances in deviations, at most `LARGEST_DISTANCE`. A number that does not exist counts as
+        far too large; for a fact that is only a lower limit, as far too small.
     """
     scaled = (numbers - middle(observation)) / observation.deviation
     clipped = np.clip(scaled, -LARGEST_DISTANCE, LARGEST_DISTANCE)

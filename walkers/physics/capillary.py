@@ -2,9 +2,9 @@
 
 References
 ----------
----------- D. Shi, J. J. McCarthy, Powder Technology 184 (2008) 65–75 (volumes). G. Lian, C.
-Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138–147, doi 10.1006/jcis.1993.1452
-(rupture).
+D. Shi, J. J. McCarthy, Powder Technology 184 (2008) 65–75 (volumes).
+G. Lian, C. Thornton, M. J. Adams, J. Colloid Interface Sci. 161 (1993) 138–147, doi
+10.1006/jcis.1993.1452 (rupture).
 """
 
 from __future__ import annotations

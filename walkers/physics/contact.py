@@ -9,9 +9,9 @@ normal speed v_n
 
 References
 ----------
----------- H. Hertz, J. reine angew. Math. 92 (1882) 156, doi 10.1515/crll.1882.92.156; R. D.
-Mindlin, J. Appl. Mech. 16 (1949) 259; K. L. Johnson, Contact Mechanics (1985), doi
-10.1017/CBO9781139171731 (the duration: ch. 11.4).
+H. Hertz, J. reine angew. Math. 92 (1882) 156, doi 10.1515/crll.1882.92.156; R. D. Mindlin, J. Appl.
+Mech. 16 (1949) 259; K. L. Johnson, Contact Mechanics (1985), doi 10.1017/CBO9781139171731 (the
+duration: ch. 11.4).
 """
 
 from __future__ import annotations

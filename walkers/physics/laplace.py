@@ -26,11 +26,12 @@ Internally, the unit is the cube root of the volume.
 
 References
 ----------
----------- C. Delaunay, J. Math. Pures Appl. 6 (1841) 309–314; K. Kenmotsu, Tôhoku Math. J. 32
-(1980) 147–153, doi 10.2748/tmj/1178229688 (the closed form). F. M. Orr, L. E. Scriven, A. P. Rivas,
-J. Fluid Mech. 67 (1975) 723–742, doi 10.1017/S0022112075000572 (bridges without weight, special
-cases). C. D. Willett, M. J. Adams, S. A. Johnson, J. P. K. Seville, Langmuir 16 (2000) 9396–9405,
-doi 10.1021/la000657y (force against gap by numerical integration; filling angles that are not
+C. Delaunay, J. Math. Pures Appl. 6 (1841) 309–314; K. Kenmotsu, Tôhoku Math. J. 32 (1980) 147–153,
+doi 10.2748/tmj/1178229688 (the closed form).
+F. M. Orr, L. E. Scriven, A. P. Rivas, J. Fluid Mech. 67 (1975) 723–742, doi
+10.1017/S0022112075000572 (bridges without weight, special cases).
+C. D. Willett, M. J. Adams, S. A. Johnson, J. P. K. Seville, Langmuir 16 (2000) 9396–9405, doi
+10.1021/la000657y (force against gap by numerical integration; filling angles that are not
 monotonic).
 """
 
@@ -106,7 +107,8 @@ class ForceCurve(NamedTuple):
 
     The columns are the arcs from the apex of either solid to its wetting line (at a sphere the
     filling angle times its radius), the excess pressure over the surface tension (1/length), and
-    the length of the profile. """
+    the length of the profile.
+    """
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ def water_glycerol(mass_fraction: float, temperature: float) -> dict[str, float]
 
     Notes
     -----
-    ----- Viscosity: N.-S. Cheng, Ind. Eng. Chem. Res. 47 (2008) 3285, doi 10.1021/ie071349z, from 0
+    Viscosity: N.-S. Cheng, Ind. Eng. Chem. Res. 47 (2008) 3285, doi 10.1021/ie071349z, from 0
     to 100 °C; within 3 % of the table of Segur and Oberstar at 20 °C. Density: A. Volk, C. J.
     Kähler, Exp. Fluids 59 (2018) 75, doi 10.1007/s00348-018-2527-y, fitted from 15 to 30 °C; within
     0.05 % of the table of Bosart and Snoddy at 20 °C. Surface tension: the CRC Handbook's table at

@@ -52,12 +52,14 @@ cavitation where the pressure is below that of the air.
 
 References
 ----------
----------- O. Pitois, P. Moucheront, X. Chateau, J. Colloid Interface Sci. 231 (2000) 26-31, doi
-10.1006/jcis.2000.7096. A. J. Goldman, R. G. Cox, H. Brenner, Chem. Eng. Sci. 22 (1967) 637-651, doi
-10.1016/0009-2509(67)80047-2. M. E. O'Neill, K. Stewartson, J. Fluid Mech. 27 (1967) 705-724, doi
-10.1017/S0022112067002551. D. J. Jeffrey, Y. Onishi, J. Fluid Mech. 139 (1984) 261-290, doi
-10.1017/S0022112084000355. J. R. Smart, D. T. Leighton, Phys. Fluids A 1 (1989) 52-60, doi
-10.1063/1.857523 (roughness as the smallest gap).
+O. Pitois, P. Moucheront, X. Chateau, J. Colloid Interface Sci. 231 (2000) 26-31, doi
+10.1006/jcis.2000.7096.
+A. J. Goldman, R. G. Cox, H. Brenner, Chem. Eng. Sci. 22 (1967) 637-651, doi
+10.1016/0009-2509(67)80047-2.
+M. E. O'Neill, K. Stewartson, J. Fluid Mech. 27 (1967) 705-724, doi 10.1017/S0022112067002551.
+D. J. Jeffrey, Y. Onishi, J. Fluid Mech. 139 (1984) 261-290, doi 10.1017/S0022112084000355.
+J. R. Smart, D. T. Leighton, Phys. Fluids A 1 (1989) 52-60, doi 10.1063/1.857523 (roughness as the
+smallest gap).
 """
 
 from __future__ import annotations

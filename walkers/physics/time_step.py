@@ -4,12 +4,13 @@ The time step has three limits. The first two apply to all granular simulations,
 wet ones. Above the third, velocities are wrong without any warning (a glycerol climber: 10.9 mm/s
 at 1.2 of the limit, 1.8 converged).
 
-    Rayleigh    π R √(ρ/G)/(0.1631 ν + 0.8766) of the smallest bead Hertz       2.87 (m*²/(R* E*²
-    v))^(1/5) for an impact at the substrate's peak velocity v viscous     2/Σ(c/m) over the bridges
-    of a bead, c = 6πηR*²/(σ + h_c) the largest normal drag, of surfaces in
-                contact (`walkers.physics.reynolds`), and m the mass that it slows (the bead's own
-                at a wall, the reduced mass between beads); two walls at an angle φ count as 1 +
-                |cos φ|
+    Rayleigh    π R √(ρ/G)/(0.1631 ν + 0.8766) of the smallest bead
+    Hertz       2.87 (m*²/(R* E*² v))^(1/5) for an impact at the substrate's peak velocity v
+    viscous     2/Σ(c/m) over the bridges of a bead
+
+In the last one, c = 6πηR*²/(σ + h_c) is the largest normal resistance of surfaces in contact
+(`walkers.physics.reynolds`), and m is the mass that it slows: the bead's own at a wall, the reduced
+mass between beads. Two walls at an angle φ count as 1 + |cos φ|.
 
 The sum takes the bridges to other beads as parallel, which is safe for clusters: the shipped
 climber, at 0.86 of its limit, has the velocity (within 0.02 %) and the kinetic energy (0.05 %) of a
@@ -40,9 +41,10 @@ FRACTIONS: Mapping[bool, Mapping[str, float]] = {
 
 At 0.4 of the viscous limit (2 µs for glycerol), the climber and the pile were converged. Walkers
 alone do not collide with each other: at 0.4 of the Rayleigh limit, velocities are within 0.25 % of
-those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of the limit they become wrong. """
+those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of the limit they become wrong.
+"""
 LONGEST_WALKER_STEP = 4e-6
-"""s; longest step of walkers, independent of their stiffness."""
+"""Longest step of walkers, whatever their stiffness, s."""
 
 
 class BridgedBead(NamedTuple):
@@ -72,7 +74,7 @@ class TimeStepLimits:
         step : float
             In s.
         reason : str
-            The limit that determines the step.
+            What determines the step: the lowest share of a limit, or the longest step of walkers.
         """
         steps = []
         for name, share in FRACTIONS[loose].items():

@@ -101,7 +101,10 @@ def model_sha256(engine: Engine) -> str | None:
 
 
 def build_script() -> str:
-    """A shell script that compiles the contact model in its own folder, as `plugin_of` does."""
+    """A shell script for decks that are run elsewhere: it compiles the sources beside it.
+
+    It compiles as `plugin_of` does, but without warnings, which tell its user nothing.
+    """
     options = " ".join(option for option in _OPTIONS if not option.startswith("-W"))
     return f"""#!/bin/sh
 # Compiles the contact model "cohesion bridge" for the liggghts of this machine: \

@@ -419,7 +419,10 @@ class _Watch:
         return failures.BeadsLost(message, self.directory, lost=lost)
 
     def _measure_clearance(self, status: _Status) -> None:
-        """Keep the distance from the outermost bead to the box."""
+        """Store the smallest distance of a bead's centre from a face of the box (m).
+
+        Store also whether this face is the top.
+        """
         lower, upper = self.deck.box
         distances = []
         for axis in range(3):
@@ -529,7 +532,7 @@ class _Watch:
             raise failures.EngineKilled(message, self.directory)
 
     def _check_frames(self) -> None:
-        """Raise `MissingFrames` if a dump is shorter than its layout says."""
+        """Raise `MissingFrames` unless each dump has exactly the frames of its layout."""
         layout = self.layout
         bead_frames = self.dump_bytes / layout.bead_dump_bytes * layout.frames
         pair_frames = _complete_frames(self.directory / layout.pair_bridge_dump)

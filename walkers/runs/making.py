@@ -669,7 +669,11 @@ def _make_together(
 def _distribute_output(
     incomplete: Path, cases: Mapping[str, Case], deck: Deck, report: EngineReport
 ) -> None:
-    """Give each run its part of the output, and a copy of the shared deck."""
+    """Give each run its part of the output, the report of the engine, and the shared deck.
+
+    The cases are in the order of the deck. Splitting removes the dumps from the folder of the deck,
+    so that only small files remain, which the runs share by hard links.
+    """
     from walkers.runs.splitting import split_output
 
     segments = {name: incomplete / name / run_directory.FIRST_SEGMENT for name in cases}

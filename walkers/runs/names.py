@@ -99,10 +99,10 @@ class Reference:
         if self.kind == "run":
             return changed_case(readable_case(self.path), self.changes)
         if self.kind in ("sweep", "calibration"):
-            # `find_input` refuses a file with what it is, and a directory as not being a case.
+            # The message of `find_input` says what the file or the directory is instead of a case.
             source = str(given) if is_sweep_file(Path(given)) else self.path
             find_input(source, "case")
-            raise not_a_run(given, self.kind)
+            raise not_a_run(given, self.kind)  # in case that it has become a case meanwhile
         if self.kind == "folder":
             raise input_error(given, "is a folder without a run")
         if self.kind in ("deck", "archive"):

@@ -316,23 +316,28 @@ def _text_of_case(case: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def _origin_text(value: Mapping[str, Any]) -> str:
-    """Origin of a value as text, such as ``library: …`` or ``guessed (not measured), …``."""
-    origin = str(value["origin"])
-    source = str(value["source"])
+def _origin_text(origin: Mapping[str, Any]) -> str:
+    """Origin of a value as text, such as ``library: …`` or ``guessed (not measured), …``.
+
+    Both ends of a range are texts, as in a case file.
+    """
+    kind = str(origin["origin"])
+    source = str(origin["source"])
     limits = ""
-    if value["range"]:
-        low, high = value["range"]
+    if origin["range"]:
+        low, high = origin["range"]
         limits = f"range {low} to {high}"
-    if origin == "default" and limits and not value["uncertain"]:
+    # A default with a range that the case does not declare in [uncertain]: nobody measured it, and
+    # the range is that of all materials.
+    if kind == "default" and limits and not origin["uncertain"]:
         return f"guessed ({source or 'not measured'}), general {limits}"
-    if origin in ("calibrated", "assumed"):
+    if kind in ("calibrated", "assumed"):  # their sources begin with this word
         text = source
     elif source:
-        text = f"{origin}: {source}"
+        text = f"{kind}: {source}"
     else:
-        text = origin
-    if value["uncertain"]:
+        text = kind
+    if origin["uncertain"]:
         text += ", uncertain"
     if limits:
         text += f", {limits}"

@@ -264,7 +264,7 @@ def _quantities_of_walkers(group: Group, label: str) -> list[ComparedQuantity]:
 
 
 def with_cycles(case: Case, cycles: int) -> Case:
-    """The case with a number of cycles in one segment, a third of them for settling.
+    """The case with a number of cycles, and the default number of settling cycles for them.
 
     Raises
     ------
@@ -280,8 +280,8 @@ def with_cycles(case: Case, cycles: int) -> Case:
             expected += f", a multiple of {cycles_per_sample}"
         raise ValueError(expected)
     table = dict(case.document.get("run", {}))
-    for length in ("cycles", "most_cycles", "duration", "settling_cycles"):
-        table.pop(length, None)
+    for key in ("cycles", "most_cycles", "duration", "settling_cycles"):
+        table.pop(key, None)
     table["cycles"] = cycles
     return build_case({**case.document, "run": table}, source=case.name, name=case.name)
 

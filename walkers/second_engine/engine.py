@@ -152,14 +152,14 @@ def _state(start: FloatArray, wall_count: int) -> State:
 def _constants(
     case: Case, radius: FloatArray, walls: Sequence[Wall], strengths: Mapping[str, float]
 ) -> Constants:
-    """The constants of a case for beads between walls.
+    """The constants of a case for beads between walls, in SI units.
 
     ``strengths`` are factors of `TERMS`: 1, or 0 for terms that are left out.
     """
     contact = case.contact
-    modulus = contact.youngs_modulus
-    ratio = contact.poissons_ratio
-    loss = log(contact.restitution)
+    youngs_modulus = contact.youngs_modulus
+    poissons_ratio = contact.poissons_ratio
+    log_restitution = log(contact.restitution)
     rows = _kernel_rows(case, walls)
     harmonics, inertial_acceleration = _drive(case)
     if not strengths["drive"]:
@@ -178,9 +178,10 @@ def _constants(
         gravity=np.array(case.gravity_vector) * strengths["gravity"],
         harmonics=harmonics,
         inertial_acceleration=inertial_acceleration,
-        modulus=modulus / (2.0 * (1.0 - ratio**2)),
-        shear_modulus=modulus / (4.0 * (1.0 + ratio) * (2.0 - ratio)),
-        damping=-loss / sqrt(loss**2 + pi**2) * strengths["damping"],
+        # Effective moduli of two bodies of the same material.
+        modulus=youngs_modulus / (2.0 * (1.0 - poissons_ratio**2)),
+        shear_modulus=youngs_modulus / (4.0 * (1.0 + poissons_ratio) * (2.0 - poissons_ratio)),
+        damping=-log_restitution / sqrt(log_restitution**2 + pi**2) * strengths["damping"],
         friction_beads=contact.friction.bead_bead * strengths["friction"],
         friction_walls=contact.friction.bead_wall * strengths["friction"],
         rolling=contact.rolling_friction * strengths["rolling-friction"],

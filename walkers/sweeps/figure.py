@@ -307,9 +307,9 @@ def _label_panels(grid: npt.NDArray[Any], panels: Sequence[_Panel], label: str) 
 
 
 def _draws(finished: pd.DataFrame, column: str) -> str:
-    """Numbers of draws of the spreads at the points: ``32``, or ``30 to 32`` if they differ.
+    """How many draws the spreads at the points have, in words (`draws_text`).
 
-    They do if some draws failed, or their walkers came apart.
+    The numbers differ between points, such as ``30 to 32``, if draws failed or walkers came apart.
     """
     numbers = finished[f"{column}_draws"].dropna()
     draws = f"{numbers.min():.0f}"

@@ -4,7 +4,7 @@
 does with a deck, and where workers run.
 
 A deck that fails is repeated as two halves; until a point is finished, the second half waits for
-the first. A failure that hits every point stops the sweep.
+the first. A failure that affects every point stops the sweep.
 """
 
 from __future__ import annotations
@@ -370,7 +370,7 @@ def run_sweep(
         If there is no engine, its audit failed, or the sweep's directory was removed during the
         sweep.
     SweepStopped
-        If a failure hits every point, or the jobs of the cluster end without doing any work.
+        If a failure affects every point, or the jobs of the cluster end without doing any work.
     """
     plan = plan_sweep(sweep, out, options, engine, on_progress)
     record = plan.record
@@ -522,7 +522,7 @@ class _SweepLoop:
     def _handle_failure(self, deck: PlannedDeck, failure: Failure) -> None:
         """Repeat a failed deck as two halves; a point that fails alone has failed."""
         is_alone = len(deck.points) == 1
-        self._check_hits(failure, is_alone=is_alone)
+        self._check_affected_points(failure, is_alone=is_alone)
         if is_alone:
             (point,) = deck.points
             self.failures.append(replace(failure, point=point, run=self.record.runs[point]))
@@ -531,14 +531,14 @@ class _SweepLoop:
         self._submit(PlannedDeck.of_points(first, self.plan.cases))
         self.waiting.append(PlannedDeck.of_points(second, self.plan.cases))
 
-    def _check_hits(self, failure: Failure, *, is_alone: bool) -> None:
-        """Raise `SweepStopped` if a failure hits every point.
+    def _check_affected_points(self, failure: Failure, *, is_alone: bool) -> None:
+        """Raise `SweepStopped` if a failure affects every point.
 
         It does if its class says so, or if the first points fail alone in the same way, which is
         not due to their parameters.
         """
         at_first = not self._has_finished_point
-        if failure.hits == "every point" or (failure.hits == "all at first" and at_first):
+        if failure.affects == "every point" or (failure.affects == "all at first" and at_first):
             raise SweepStopped(
                 f"{failure.message}; this would hit every point, and the sweep is stopped"
             )
@@ -546,7 +546,7 @@ class _SweepLoop:
         if is_alone:
             self.same_failures[kind] += 1
         are_many = self.same_failures[kind] >= _MOST_SAME_FAILURES
-        if are_many and at_first and failure.hits != "one point":
+        if are_many and at_first and failure.affects != "one point":
             raise SweepStopped(
                 f"{failure.cause}; the first {_MOST_SAME_FAILURES} points failed in the same way, "
                 "and the sweep is stopped"

@@ -537,7 +537,10 @@ def _column_texts(frame: pd.DataFrame, name: str) -> tuple[list[str], str]:
 
 
 def _cell(value: Any, factor: float, unit: str) -> str:
-    """A value as text: a number is multiplied by the factor, which makes it one of the unit."""
+    """A value as text: a number in a unit, rounded as usual for it.
+
+    The factor converts the number to the unit. A missing value, None or NaN, is a dash.
+    """
     if isinstance(value, (bool, str)):
         return str(value)
     if value is None:

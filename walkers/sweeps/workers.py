@@ -39,7 +39,7 @@ _UNKNOWN_POINT = -1
 
 
 class SweepStopped(WalkersError):
-    """A failure that hits every point, or jobs of a cluster that end without doing any work."""
+    """A failure that affects every point, or jobs of a cluster that end without doing any work."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,8 @@ class Failure:
         What failed, and where its files are.
     directory
         Directory of the unfinished run; None if there is none.
-    hits
-        Which points such a failure hits, see `walkers.runner.failures.EngineFailure`.
+    affects
+        Which points such a failure affects, see `walkers.runner.failures.EngineFailure`.
     cause
         The message without the directory: the same for points that fail in the same way.
     """
@@ -69,7 +69,7 @@ class Failure:
     reason: str
     message: str
     directory: str | None
-    hits: str = field(default="", repr=False)
+    affects: str = field(default="", repr=False)
     cause: str = field(default="", repr=False)
 
 
@@ -144,7 +144,10 @@ def _check_worker(engine: Engine, task: DeckTask) -> None:
 
 
 def _failure_of_deck(error: OSError | WalkersError, task: DeckTask) -> Failure:
-    """The failure that an error on a worker is."""
+    """Describe an error on a worker as a failure of its points.
+
+    Its directory is where the remains of the first run are kept.
+    """
     kind: type[Exception] = type(error)
     message = str(error)
     cause = message
@@ -166,7 +169,7 @@ def _failure_of_deck(error: OSError | WalkersError, task: DeckTask) -> Failure:
         reason=kind.__name__,
         message=message,
         directory=directory,
-        hits=getattr(kind, "affects", ""),
+        affects=getattr(kind, "affects", ""),
         cause=cause,
     )
 

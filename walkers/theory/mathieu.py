@@ -55,7 +55,8 @@ _ANGLE = radians(1.0)
 """Angle to the axis at which rolling friction is evaluated.
 
 Rolling friction is larger at smaller angles: while the rolling along the axis reverses, only
-sideways rolling is left. """
+sideways rolling is left.
+"""
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,8 @@ STEPS_PER_CYCLE = 64
 """Default number of steps per cycle.
 
 Velocities differ from those with 1024 steps by up to 0.01 mm/s; without viscous bridges by up to
-0.07 mm/s (80 Hz, up to 11 g). """
+0.07 mm/s (80 Hz, up to 11 g).
+"""
 CYCLES = 60
 """Default of the largest number of cycles."""
 
@@ -122,7 +123,8 @@ class PredictedMotion:
     """m/s, shape (N,), positive toward the large bead.
 
     NaN where a contact opened, because the model does not hold there, and where the forces have no
-    solution. """
+    solution.
+    """
     rotation: FloatArray
     """Velocities -R dφ/dt of the beads, m/s, shape (2, N)."""
     sliding: FloatArray

@@ -216,9 +216,13 @@ def predict(case: Case) -> dict[str, Any]:
 
 
 def _by_the_paper(case: Case) -> dict[str, Any]:
-    """The velocity of a case's dimer in the model of the paper, m/s.
+    """The velocity of a case's dimer in the model of the paper.
 
-    It is NaN, with the reason, where the model does not hold.
+    Returns
+    -------
+    dict
+        ``friction``, the paper's κ (s/m); ``velocity`` (m/s), NaN where the model does not apply or
+        a contact would open; and the ``reason`` for that, None if there is a velocity.
     """
     dimer = dimer_of(case)
     velocity = nan

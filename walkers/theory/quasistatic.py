@@ -80,7 +80,7 @@ def rolling_matrix(first_radius: npt.ArrayLike, second_radius: npt.ArrayLike) ->
 
     Notes
     -----
-    ----- Beads that move at v = (v1 + v2 - v3)/2 and slide at v1 and v2 on the substrate roll on it
+    Beads that move at v = (v1 + v2 - v3)/2 and slide at v1 and v2 on the substrate roll on it
     at q1 = (v1 - v)/R1 and q2 = (v2 - v)/R2, and on each other at q3 = q1 - q2, with the first bead
     as body 1.
     """

@@ -36,7 +36,8 @@ _SLIDING, _PARALLEL, _NORMAL, _MODE = range(4)
 """Rows of a walker's state: sliding velocities, friction forces, normal forces, and modes.
 
 The mode is 0 for a contact that sticks, and the sign of the sliding of others. The work array
-contains such a state, then a matrix (three rows) and a right side. """
+contains such a state, then a matrix (three rows) and a right side.
+"""
 _COAST = 0
 """First row of the matrix P in a walker's table."""
 _GAIN = 3

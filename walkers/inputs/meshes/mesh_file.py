@@ -62,7 +62,7 @@ def read_mesh(path: Path) -> dict[str, Any]:
 
 
 def _check_file(path: Path) -> None:
-    """Refuse what is not a file, or is too large."""
+    """Raise `ValueError` for what is not a file, or is too large."""
     try:
         status = path.stat()
     except OSError as error:

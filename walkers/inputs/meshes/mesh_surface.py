@@ -441,7 +441,11 @@ def _same_point_distance(solid: Vessel) -> float:
 
 
 def _inner_skin(solid: Vessel, basin: _Basin) -> Vessel:
-    """The surface of a hollow up to its rim, which is level."""
+    """The surface of a hollow up to the level at which it overflows.
+
+    What is above this level is cut off, so that the rim is level. Raises `ValueError` if the
+    remaining surface is not that of a vessel.
+    """
     within = np.isin(solid.triangles, list(basin.points)).any(axis=1)
     skin = _restricted(solid, solid.triangles[within])
     if skin.points[:, 2].max() <= basin.level + _same_point_distance(solid):

@@ -131,7 +131,7 @@ class Record(ConfigTable):
         if self.repeats:
             return None
         count = len(self.rows)
-        width = int(min(_SLOW_WINDOW_PERIODS / self._line_periods[0], 1.0) * count)
+        width = int(min(_SLOW_WINDOW_PERIODS / self._periods_of_lines[0], 1.0) * count)
         time = np.linspace(0.0, self.length, count)
         slow = slow_part(self.course(time), width)
         nodes = np.unique(np.linspace(0, count - 1, 4 + 16 * count // width).astype(np.int64))
@@ -154,8 +154,9 @@ class Record(ConfigTable):
     def largest(self, order: int) -> float:
         """Largest displacement, velocity or acceleration of the spline.
 
-        It is the largest length of the vector, at the rows and at three times between any two: with
-        six rows a period, the rows alone miss the peak of a sine by up to 13 %. Displacement and
+        It is the largest length of the vector, at the rows and at three instants between
+        neighbouring rows: with six rows a period, the rows alone miss the peak of a sine by up to
+        13 %. Displacement and
         velocity are without their slow part, which is uncertain near both ends of a record: they
         are not evaluated there.
 
@@ -167,7 +168,7 @@ class Record(ConfigTable):
         rows = np.arange(len(self.course.x))
         time = np.interp(np.arange(0.0, rows[-1] + 0.125, 0.25), rows, self.course.x)
         if order < 2 and not self.repeats:
-            margin = min(_SLOW_WINDOW_PERIODS / self._line_periods[0], 0.4) * self.length
+            margin = min(_SLOW_WINDOW_PERIODS / self._periods_of_lines[0], 0.4) * self.length
             time = time[(time >= margin) & (time <= self.length - margin)]
         return float(np.linalg.norm(self.shaking(time, order), axis=1).max())
 
@@ -237,7 +238,7 @@ class Record(ConfigTable):
         return int(self._spectrum[1:].argmax()) + 1
 
     @cached_property
-    def _line_periods(self) -> list[int]:
+    def _periods_of_lines(self) -> list[int]:
         """Number of periods of each line in the record, increasing.
 
         Lines are maxima of the spectrum, from two periods on, that are not faint.
@@ -290,7 +291,7 @@ class Record(ConfigTable):
         width = AMPLITUDE_WINDOW_PERIODS / periods
         # Beats with another line come and go within a few cycles: the amplitude does not change.
         fewest_beats = float(count)
-        for line_periods in self._line_periods:
+        for line_periods in self._periods_of_lines:
             beats = abs(line_periods - periods)
             if beats >= _FEWEST_BEATS:
                 fewest_beats = min(beats, fewest_beats)
@@ -357,7 +358,7 @@ class Record(ConfigTable):
         """Largest error of the offset due to lines that do not end after whole periods, m/s²."""
         if self.repeats:
             return 0.0
-        periods = np.array(self._line_periods)
+        periods = np.array(self._periods_of_lines)
         return float(np.sum(self._spectrum[periods] * leakage(np.maximum(periods, 2.0))))
 
     @cached_property
@@ -369,7 +370,7 @@ class Record(ConfigTable):
         first = hann_mean(self._even_samples[:half])
         second = hann_mean(self._even_samples[-half:])
         change = float(np.linalg.norm(second - first))
-        periods = np.array(self._line_periods)
+        periods = np.array(self._periods_of_lines)
         leakages = leakage(np.maximum(periods / 2.0, 1.5))  # half the periods in each half
         possible = 2.0 * np.sum(self._spectrum[periods] * leakages)
         if change <= possible:
@@ -382,7 +383,7 @@ class Record(ConfigTable):
         doubts = []
         error = self.uncertain_offset
         if error > _TILT:
-            periods = f"{self._line_periods[0]} periods of its slowest line"
+            periods = f"{self._periods_of_lines[0]} periods of its slowest line"
             doubts.append(
                 f"drive.record has only {periods}: its offset is uncertain by {_as_tilt(error)}"
             )

@@ -38,9 +38,14 @@ def drive_of(table: DriveTable, boundary: Boundary, dimer: Dimer | None, notes: 
     boundary
         The boundary; by default, containers are shaken along z, substrates along x.
     dimer
-        The first walkers, to which Γ0 refers; None if they are not dimers.
+        The first walkers, to which Γ0 refers (`walkers.physics.dimer`); None if they are no dimers.
     notes
         Get the sources of the axes and the peak accelerations.
+
+    Returns
+    -------
+    Drive
+        The drive with all values in SI units.
 
     Raises
     ------

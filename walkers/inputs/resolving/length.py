@@ -96,6 +96,8 @@ def resolved_run(case: Setup) -> tuple[RunSettings, dict[str, Source]]:
     settling_cycles = table.settling_cycles
     if settling_cycles is None:
         settling_cycles = settling_of(cycles) if case.walkers else 0
+    # Loose beads come to rest before the drive; 0 means that they do not. The settling cycles of
+    # walkers are driven, but not measured.
     longest_settling = table.longest_settling
     if longest_settling is None and case.loose:
         longest_settling = _LONGEST_SETTLING
@@ -118,14 +120,14 @@ def resolved_run(case: Setup) -> tuple[RunSettings, dict[str, Source]]:
             "longest_settling": longest_settling or None,
         },
     )
-    most_cycles = MOST_STEPS // steps_per_cycle
+    countable_cycles = MOST_STEPS // steps_per_cycle
     if longest_settling:
-        most_cycles -= ceil((longest_settling + _SETTLING_MARGIN) * drive.frequency)
-        if most_cycles < 1:
+        countable_cycles -= ceil((longest_settling + _SETTLING_MARGIN) * drive.frequency)
+        if countable_cycles < 1:
             limit = MOST_STEPS * time_step - _SETTLING_MARGIN
             message = f"expected less than {limit:.3g} s: the engine counts steps up to 2^31"
             raise key_error("run.longest_settling", message)
-    _check_length(case, run, most_cycles)
+    _check_length(case, run, countable_cycles)
     return run, _sources(run, case, reason)
 
 
@@ -195,9 +197,10 @@ def cycles_of(table: RunTable, drive: Excitation, cycles_per_sample: int) -> int
 
 
 def _sources(run: RunSettings, case: Setup, reason: str) -> dict[str, Source]:
-    """Sources of the values of a run that its table does not give, by their keys.
+    """Sources of the values of a run, by their keys.
 
-    ``reason`` says which limit the time step is from.
+    Those of values that the file gives are not used. ``reason`` says which limit the time step is
+    from.
     """
     sources = {
         "run.samples_per_cycle": _source_of_samples(run, case),

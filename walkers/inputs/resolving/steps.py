@@ -145,13 +145,17 @@ def _dimer(file: CaseFile, drafts: Mapping[str, WalkerDraft]) -> Dimer | None:
 
 
 def _liquid(liquid: LiquidTable, notes: Notes) -> Liquid:
-    """The liquid with its dynamic viscosity."""
+    """The liquid with its dynamic viscosity, Pa s.
+
+    The table has one of both viscosities; the kinematic one is in m²/s, the density in kg/m³.
+    """
     viscosity = liquid.dynamic_viscosity
     if liquid.kinematic_viscosity is not None:
         if liquid.density is None:
             message = "missing; expected the liquid's density beside its kinematic_viscosity"
             raise key_error("liquid.density", message)
-        viscosity = float(f"{liquid.kinematic_viscosity * liquid.density:.15g}")
+        product = liquid.kinematic_viscosity * liquid.density
+        viscosity = float(f"{product:.15g}")  # the number that one would write
         notes.add("liquid.dynamic_viscosity", "from kinematic_viscosity and density")
     return liquid.completed(Liquid, {"dynamic_viscosity": viscosity})
 

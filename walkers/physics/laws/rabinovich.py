@@ -10,9 +10,9 @@ resistances. Equations are numbered as in the source of YADE (its ViscElCapPhys)
 
 References
 ----------
----------- Y. I. Rabinovich, M. S. Esayanur, B. M. Moudgil, Langmuir 21 (2005) 10992–10997, doi
-10.1021/la0517639. P. Lambert, A. Chau, A. Delchambre, S. Régnier, Langmuir 24 (2008) 3157–3163, doi
-10.1021/la7036444.
+Y. I. Rabinovich, M. S. Esayanur, B. M. Moudgil, Langmuir 21 (2005) 10992–10997, doi
+10.1021/la0517639.
+P. Lambert, A. Chau, A. Delchambre, S. Régnier, Langmuir 24 (2008) 3157–3163, doi 10.1021/la7036444.
 """
 
 from __future__ import annotations

@@ -12,9 +12,9 @@ law. The bridge breaks at (1 + θ/2) V^(1/3).
 
 References
 ----------
----------- F. Soulié, F. Cherblanc, M. S. El Youssoufi, C. Saix, Int. J. Numer. Anal. Meth. Geomech.
-30 (2006) 213, Eqs. 13, 14. Nase et al. as in D. Shi, J. J. McCarthy, Powder Technology 184 (2008)
-65–75, Eqs. 40, 41.
+F. Soulié, F. Cherblanc, M. S. El Youssoufi, C. Saix, Int. J. Numer. Anal. Meth. Geomech. 30 (2006)
+213, Eqs. 13, 14.
+Nase et al. as in D. Shi, J. J. McCarthy, Powder Technology 184 (2008) 65–75, Eqs. 40, 41.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ Coefficients are as in the source of YADE (its ViscElCapPhys).
 
 References
 ----------
----------- C. D. Willett, M. J. Adams, S. A. Johnson, J. P. K. Seville, Langmuir 16 (2000)
-9396–9405, doi 10.1021/la000657y.
+C. D. Willett, M. J. Adams, S. A. Johnson, J. P. K. Seville, Langmuir 16 (2000) 9396–9405, doi
+10.1021/la000657y.
 """
 
 from __future__ import annotations

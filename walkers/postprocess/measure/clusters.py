@@ -714,11 +714,15 @@ def events_of(tracks: Sequence[Track], climbs: Columns, beads: PileBeads) -> Col
 
 
 def _rejoined(track: Track, beads: PileBeads) -> bool:
-    """Tell whether most beads of a track were in the bulk within `MAX_GAP` after its last frame."""
+    """Tell whether a cluster rejoined the bulk when its track ended.
+
+    At least `MIN_OVERLAP` of its last beads are in the bulk in one of the frames after the last
+    one, up to the first frame that is later by more than `MAX_GAP`, in which the track is given up.
+    """
     time = beads.time
     last = track.frames[-1]
-    after_gap = int(np.searchsorted(time, time[last] + MAX_GAP, side="right"))
-    until = min(after_gap, len(time) - 1)
+    given_up = int(np.searchsorted(time, time[last] + MAX_GAP, side="right"))
+    until = min(given_up, len(time) - 1)
     members = list(track.members[-1])
     return any(bulk[members].mean() >= MIN_OVERLAP for bulk in beads.bulk[last + 1 : until + 1])
 

@@ -363,7 +363,8 @@ class Group:
     def turned_at(self) -> FloatArray:
         """Time at which walkers have turned by more than 90° from their start, s, shape (W,).
 
-        It is the end of the first cycle with such a heading; NaN if there is none.
+        It is the end of the first cycle after which the orientation differs so much from that of
+        the first frame; NaN if there is none. The motion begins with the drive.
         """
         frames_per_cycle = self.case.run.samples_per_cycle
         turned = self.orientation[::frames_per_cycle] - self.orientation[0]
@@ -753,7 +754,8 @@ def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Itera
     Raises
     ------
     DumpError
-        If a dump cannot be read or ends early, or if none of all frames recorded bridges.
+        If a dump cannot be read or ends early; that is found after its frames. If all frames are to
+        be read and none recorded bridges.
     """
     stride = motion.case.run.samples_per_bridge_sample
     frame_at = {
@@ -776,7 +778,7 @@ def read_bridges(motion: Motion, frames: Collection[int] | None = None) -> Itera
                 yield _bridges(motion, frame, pair_rows, wall_rows, layout)
         if count != layout.bridge_frames:
             raise DumpError(f"{segment}: its bridges hold {count} of {layout.bridge_frames} frames")
-    if frames is None and len(frame_at) == len(motion.frames):
+    if frames is None and len(frame_at) == len(motion.frames):  # none has been taken out
         raise DumpError(f"{motion.directory}: none of its frames recorded bridges")
 
 

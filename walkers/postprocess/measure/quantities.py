@@ -71,8 +71,9 @@ class Quantity:
 def _quantity(name: str, entry: str | list[str]) -> Quantity:
     """A quantity from its entry in the file.
 
-    The entry is a list of unit, label, meaning (the label if it is missing) and name of the error;
-    or what a table adds to the meaning of a shared column.
+    A list has the unit, the label, the meaning (the label if it is missing) and the name of the
+    error. A text belongs to a column of several tables, which stands under ``[shared]`` in the
+    file; it is added to the meaning of this column.
     """
     if isinstance(entry, str):
         unit, label, *rest = _FILE["shared"][name]

@@ -307,8 +307,8 @@ def _check_names(entries: Mapping[str, Any], names: Iterable[str]) -> None:
 def _is_outdated(directory: Path, versions: Mapping[str, Any] | None) -> bool:
     """Tell whether a module that measured a result has another version now.
 
-    Results without ``versions`` were written before modules had any. Versions of modules began at
-    the version of these results; which modules measured them follows from the case.
+    Results without ``versions`` were written before modules had versions of their own. They count
+    as measured by modules of the version `_BEFORE_MODULES`; which ones follows from the case.
     """
     if versions is None:
         changed = [module for module in MODULES if module.VERSION != _BEFORE_MODULES]

@@ -254,7 +254,10 @@ def _trajectory_table(group: Group) -> Columns:
 
 
 def _walkers_table(group: Group, averages: gait.Averages) -> Columns:
-    """Table ``walkers``: the start of each walker, and means over the cycles after settling."""
+    """Table ``walkers``: start and end of each walker, and means over the cycles after settling.
+
+    Values are in SI units. Contacts are those of the beads, then those between the beads.
+    """
     beads = len(group.radii)
     samples = gait.settled_samples(group.case.run)
     loads_of_pairs = contact_loads(group.case, group.kind)[beads:]

@@ -242,7 +242,10 @@ class _Film:
     def pictures(
         self, numbers: Iterable[int], on_progress: Tell | None = None
     ) -> Iterator[Picture]:
-        """Draw the pictures with some numbers; ``on_progress`` is called after each."""
+        """Draw pictures by their numbers, from 0, in ascending order.
+
+        ``on_progress`` is called after each of them.
+        """
         for number in numbers:
             picture = self.window.picture(self.times.frame[number], self.bridges[number])
             yield self.captions.draw_into(picture, number)

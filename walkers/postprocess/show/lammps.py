@@ -81,7 +81,11 @@ def write_trajectory(
 
 
 def _box(motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Lowest and highest corner of the box of all frames, m, shape (3,) each."""
+    """Lowest and highest corner of the box of all frames, m, shape (3,) each.
+
+    It contains the beads, the height 0 of the floor, and the width of a container, which is centred
+    at x = y = 0.
+    """
     radius = motion.radius[:, None]
     low = (motion.position - radius).min(axis=(0, 1))
     high = (motion.position + radius).max(axis=(0, 1))

@@ -69,7 +69,9 @@ def motion_in_view(motion: Motion, walker: int | None) -> tuple[Motion, bool]:
 def gathered(motion: Motion, lane: float = 2.0) -> Motion:
     """Move independent walkers onto parallel lanes for pictures.
 
-    Between walls the first walker is shown alone. All other motions are returned unchanged.
+    In a deck, independent walkers start far apart (``walker.origin``). In a picture, the first one
+    starts at the origin, and the others beside it. Between walls the first walker is shown alone. A
+    motion whose walkers may meet is returned unchanged.
 
     Parameters
     ----------
