@@ -684,7 +684,8 @@ def test_compared_runs_tell_their_bands_or_how_to_have_them(fast_and_slow: Compa
 
 def test_a_comparison_says_that_scatter_is_no_error(fast_and_slow: Comparison) -> None:
     assert (
-        "\n\nscatter of copies: how much copies differ by their start; no error of the difference\n"
+        "\n\nscatter of copies: how much copies differ by their start; "
+        "it is not an error of the difference\n"
     ) in fast_and_slow.text
 
 

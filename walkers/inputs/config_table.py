@@ -487,6 +487,6 @@ def _no_entry_error(name: str, value: Any, above: str, place: object) -> InputEr
     """The error of a key that names an entry which the list above it does not have."""
     expected = "the whole list"
     if isinstance(place, list):
-        expected = f"a place below [{len(place)}]"
+        expected = f"an index below [{len(place)}]"
     message = f"the base case has no {above} of that length; expected {expected}"
     return key_error(name, message, value)

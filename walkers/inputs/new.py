@@ -50,7 +50,7 @@ def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[
     try:
         _write_new(path, text)
     except FileExistsError as error:
-        message = "exists already: it is not overwritten; expected another name"
+        message = "exists already and is not overwritten; expected another name"
         raise input_error(path, message) from error
     except OSError as error:
         message = f"cannot be written ({error.strerror}): expected a name in a folder that exists"

@@ -325,7 +325,8 @@ def _table_of_numbers(
     paragraphs = [aligned(list(zip(*columns, strict=True)))]
     if has_scatter:
         paragraphs.append(
-            "scatter of copies: how much copies differ by their start; no error of the difference"
+            "scatter of copies: how much copies differ by their start; "
+            "it is not an error of the difference"
         )
     return paragraphs
 
