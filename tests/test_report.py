@@ -128,7 +128,7 @@ def swept(once: Once) -> Path:
         sweep.runs[1].report()
         sweep.report()
 
-    return once("swept", write) / "two"
+    return once("sweep-report", write) / "two"
 
 
 @pytest.fixture(scope="session")

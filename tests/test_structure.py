@@ -158,3 +158,11 @@ def test_places_that_contributing_names_exist() -> None:
     assert len(places) > 50
     for place in places:
         assert (ROOT / place).exists(), place
+
+
+def test_folders_that_tests_fill_once_have_different_names() -> None:
+    names = []
+    for path in sorted((ROOT / "tests").glob("*.py")):
+        names += re.findall(r'\bonce\(\s*"([^"]+)"', path.read_text("utf-8"))
+    assert len(names) > 20
+    assert sorted(names) == sorted(set(names))
