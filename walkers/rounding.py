@@ -92,6 +92,19 @@ def _decimals(value: float, most: int) -> int:
     return min(most, DIGITS - 1 - exponent)
 
 
+def to_fifteen_digits(value: float) -> float:
+    """The nearest number of fifteen significant digits: the one that a person would write.
+
+    A product of decimal numbers often differs from it in its last bit.
+
+    Examples
+    --------
+    >>> 4.0 * 0.001 / 1e-6, to_fifteen_digits(4.0 * 0.001 / 1e-6)
+    (4000.0000000000005, 4000.0)
+    """
+    return float(f"{value:.15g}")
+
+
 def counted(number: int, noun: str) -> str:
     """A number with its noun, such as ``2 runs``."""
     plural = "" if number == 1 else "s"

@@ -20,6 +20,8 @@ from pydantic_core.core_schema import (
     with_info_before_validator_function,
 )
 
+from walkers.rounding import to_fifteen_digits
+
 if TYPE_CHECKING:
     from pint import UnitRegistry
 
@@ -160,7 +162,7 @@ def parse_quantity(text: str, kind: QuantityKind) -> float:
     factor = _factor_of(symbol, kind)
     zero = _ZEROS.get(symbol, 0.0)
     # Rounded: 4.0 g/cm³ is 4000 kg/m³, not 3999.9999999999995.
-    value = float(f"{float(match['number']) * factor + zero:.15g}")
+    value = to_fifteen_digits(float(match["number"]) * factor + zero)
     if value != 0.0 and not kind.smallest <= abs(value) <= kind.largest:
         low = _bound_text(kind.smallest, factor, zero)
         high = _bound_text(kind.largest, factor, zero)

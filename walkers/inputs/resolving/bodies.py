@@ -33,6 +33,7 @@ from walkers.inputs.tables.bodies import (
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.tables.drive import Excitation
+from walkers.rounding import to_fifteen_digits
 
 _PACKING = 0.55
 """Packing fraction of a settled wet pile, for the number of beads that fill a height."""
@@ -102,9 +103,9 @@ def _radii_of_dimers(dimers: DimersTable, notes: Notes) -> tuple[float, ...]:
     if dimers.mean_radius is None or dimers.sin_delta is None:
         return _radii(dimers.radii, dimers.diameters, "dimers.radii", notes)
     notes.add("dimers.radii", "from mean_radius and sin_delta")
-    first = float(f"{dimers.mean_radius * (1.0 + dimers.sin_delta):.15g}")
-    second = float(f"{dimers.mean_radius * (1.0 - dimers.sin_delta):.15g}")
-    return first, second
+    first = dimers.mean_radius * (1.0 + dimers.sin_delta)
+    second = dimers.mean_radius * (1.0 - dimers.sin_delta)
+    return to_fifteen_digits(first), to_fifteen_digits(second)
 
 
 def _radii(

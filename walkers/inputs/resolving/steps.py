@@ -38,6 +38,7 @@ from walkers.inputs.tables.materials import Contact, Liquid, LiquidTable
 from walkers.inputs.units import LENGTH, parse_quantity
 from walkers.physics.capillary import DEFAULT_LAW, bridge_volume
 from walkers.physics.dimer import Dimer
+from walkers.rounding import to_fifteen_digits
 
 _SOFTEST = 5e7
 """Lowest Young's modulus of ``"auto"``, Pa."""
@@ -154,8 +155,7 @@ def _liquid(liquid: LiquidTable, notes: Notes) -> Liquid:
         if liquid.density is None:
             message = "missing; expected the liquid's density beside its kinematic_viscosity"
             raise key_error("liquid.density", message)
-        product = liquid.kinematic_viscosity * liquid.density
-        viscosity = float(f"{product:.15g}")  # the number that one would write
+        viscosity = to_fifteen_digits(liquid.kinematic_viscosity * liquid.density)
         notes.add("liquid.dynamic_viscosity", "from kinematic_viscosity and density")
     return liquid.completed(Liquid, {"dynamic_viscosity": viscosity})
 

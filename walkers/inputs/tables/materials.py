@@ -13,6 +13,7 @@ from walkers.inputs import units
 from walkers.inputs.config_table import Choice, ConfigTable, Indirect, key
 from walkers.inputs.units import Coefficient, Number
 from walkers.physics.capillary import DEFAULT_LAW, BridgeLiquid
+from walkers.rounding import to_fifteen_digits
 
 STIFFEST = 1e11
 """Largest Young's modulus of contacts, Pa: that of glass or steel, with which a run takes a day."""
@@ -92,11 +93,9 @@ class Liquid(LiquidTable):
 
         Either the volume fraction or the radius of the menisci is given; the other is 0.
         """
-        viscosity = self.dynamic_viscosity * self.viscosity_ratio
         return BridgeLiquid(
             surface_tension=self.surface_tension,
-            # Rounded so that equal liquids have equal bridges, however their viscosity was given.
-            viscosity=float(f"{viscosity:.15g}"),
+            viscosity=to_fifteen_digits(self.dynamic_viscosity * self.viscosity_ratio),
             volume_fraction=self.volume_fraction or 0.0,
             meniscus_radius=self.meniscus_radius or 0.0,
             contact_angle=self.contact_angle,
