@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from walkers.arrays import FloatArray, Vector
+from walkers.text import numbers_text
 
 
 class HalfSpace(NamedTuple):
@@ -27,11 +28,6 @@ class HalfSpace(NamedTuple):
     point: Vector
     direction: Vector
     bound: float
-
-
-def numbers_text(*values: float) -> str:
-    """Numbers that the engine reads as the same doubles."""
-    return " ".join(repr(float(value)) for value in values)
 
 
 class Facet(NamedTuple):
@@ -106,12 +102,12 @@ class Facet(NamedTuple):
 
     def file_rows(self) -> str:
         """Its line of the file of facets, and one for each cell."""
-        place = f"{numbers_text(*self.point)}  {numbers_text(*self.direction)}"
+        place = f"{numbers_text(self.point)}  {numbers_text(self.direction)}"
         lines = [f"{self.kind} {place}  {len(self.cells)}\n"]
         for cell in self.cells:
             texts = []
             for point, direction, bound in cell:
-                texts.append(numbers_text(*point, *direction, bound))
+                texts.append(numbers_text((*point, *direction, bound)))
             lines.append(f"{len(cell)}  {'  '.join(texts)}\n")
         return "".join(lines)
 

@@ -15,8 +15,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from walkers.arrays import FloatArray, Vector
-from walkers.inputs.meshes.facet import numbers_text
 from walkers.inputs.meshes.wall_names import FLOOR_NAME
+from walkers.text import numbers_text
 
 FLOOR = FLOOR_NAME
 """Name of the wall that is the floor."""
@@ -120,7 +120,7 @@ class Flat(NamedTuple):
 
     def deck_words(self) -> str:
         """Words of the command ``fix wall/bridge``: a point and the normal."""
-        return f"plane {numbers_text(*self.point)}  {numbers_text(*self.normal)}"
+        return f"plane {numbers_text(self.point)}  {numbers_text(self.normal)}"
 
     def file_rows(self) -> str:
         """Empty: the plane stands in the command."""
@@ -166,7 +166,7 @@ class Round(NamedTuple):
 
     def deck_words(self) -> str:
         """Words of the command ``fix wall/bridge``: x and y of the axis, and the radius."""
-        return f"cylinder {numbers_text(0.0, 0.0, self.radius)}"
+        return f"cylinder {numbers_text((0.0, 0.0, self.radius))}"
 
     def file_rows(self) -> str:
         """Empty: the cylinder stands in the command."""
