@@ -99,10 +99,11 @@ class Reference:
         if self.kind == "run":
             return changed_case(readable_case(self.path), self.changes)
         if self.kind in ("sweep", "calibration"):
-            # The message of `find_input` says what the file or the directory is instead of a case.
+            # The error of `find_input` says what the file or the directory is instead of a case.
+            # There is none for a file whose kind it cannot tell.
             source = str(given) if is_sweep_file(Path(given)) else self.path
             find_input(source, "case")
-            raise not_a_run(given, self.kind)  # in case that it has become a case meanwhile
+            raise not_a_run(given, self.kind)
         if self.kind == "folder":
             raise input_error(given, "is a folder without a run")
         if self.kind in ("deck", "archive"):
