@@ -94,9 +94,9 @@ FRAME = 13
 
 
 @pytest.fixture(scope="module")
-def collection(directory: Path) -> Path:
-    """An export of each frame."""
-    return write_vtk(directory, directory / "all", every=1)
+def collection(directory: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An export of each frame, not in the run, which all workers share."""
+    return write_vtk(directory, tmp_path_factory.mktemp("export") / "all", every=1)
 
 
 @pytest.mark.parametrize(
