@@ -38,7 +38,7 @@ from walkers.progress import Progress
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.runner.run_directory import case_of, locked
 from walkers.runs.case_text import readable
-from walkers.runs.comparison import Comparison, Side, compare_runs
+from walkers.runs.comparison import ComparedRun, Comparison, compare_runs
 from walkers.runs.listing import bytes_text, size_and_last_change
 from walkers.runs.removal import Removal, remove, unfinished_in
 from walkers.sweeps.record import read_sweep_record
@@ -576,7 +576,7 @@ def test_compared_cases_show_what_follows_from_their_materials() -> None:
     """Friction, roughness, and liquid that only one case has."""
     ruby = load_case("fig1b")
     glass = changed_case(ruby, {"beads.material": "glass"})
-    text = compare_runs(Side("a", ruby, None), Side("b", glass, None)).text
+    text = compare_runs(ComparedRun("a", ruby, None), ComparedRun("b", glass, None)).text
     cells = {tuple(re.split("  +", line)) for line in text.splitlines()}
     assert cells >= {
         ("beads.material", "ruby", "glass", "given"),
@@ -587,14 +587,14 @@ def test_compared_cases_show_what_follows_from_their_materials() -> None:
 
 
 def test_defaults_of_a_table_that_one_case_has_are_not_compared() -> None:
-    dimer = Side("dimer", load_case("fig1b"), None)
-    cluster = Side("cluster", load_case("cluster"), None)
+    dimer = ComparedRun("dimer", load_case("fig1b"), None)
+    cluster = ComparedRun("cluster", load_case("cluster"), None)
     keys = compare_runs(dimer, cluster).contents["parameters"]
     assert "dimers.radii" in keys
     assert "dimers.replicates" not in keys
 
 
-def _changed_run(run: Path, to: Path, numbers: dict[str, float], error: float = 0.0) -> Side:
+def _changed_run(run: Path, to: Path, numbers: dict[str, float], error: float = 0.0) -> ComparedRun:
     """Copy a run and give the copy other numbers of its result, and numerical errors.
 
     ``error`` is that of the velocity and of `right_facing`, in m/s; 0 if none was measured.
@@ -611,7 +611,7 @@ def _changed_run(run: Path, to: Path, numbers: dict[str, float], error: float = 
     manifest = read_json(to / MANIFEST_NAME)
     manifest["sha256"] |= checksums(to, changed_files)
     write_json(to / MANIFEST_NAME, manifest)
-    return Side(to.name, case_of(run), to)
+    return ComparedRun(to.name, case_of(run), to)
 
 
 @pytest.fixture
@@ -622,14 +622,14 @@ def uncertain_run(run_directory: Callable[..., Path]) -> Path:
 
 
 @pytest.fixture
-def fast(uncertain_run: Path, tmp_path: Path) -> Side:
+def fast(uncertain_run: Path, tmp_path: Path) -> ComparedRun:
     """A run of 1.05 mm/s, 1.1 mm/s of those facing right, with errors of 3 µm/s."""
     numbers = {"velocity": 1.05e-3, "right_facing": 1.1e-3, "scatter": 4e-9}
     return _changed_run(uncertain_run, tmp_path / "fast", numbers, error=3e-6)
 
 
 @pytest.fixture
-def slow(uncertain_run: Path, tmp_path: Path) -> Side:
+def slow(uncertain_run: Path, tmp_path: Path) -> ComparedRun:
     """A run of 1 mm/s, 1 mm/s of those facing right, with errors of 4 µm/s, and a band."""
     numbers = {"velocity": 1e-3, "right_facing": 1e-3}
     slow = _changed_run(uncertain_run, tmp_path / "slow", numbers, error=4e-6)
@@ -642,7 +642,7 @@ def slow(uncertain_run: Path, tmp_path: Path) -> Side:
 
 
 @pytest.fixture
-def fast_and_slow(fast: Side, slow: Side) -> Comparison:
+def fast_and_slow(fast: ComparedRun, slow: ComparedRun) -> Comparison:
     return compare_runs(fast, slow)
 
 
@@ -690,7 +690,7 @@ def test_a_comparison_says_that_scatter_is_no_error(fast_and_slow: Comparison) -
 
 
 def test_numerical_errors_are_a_column_only_if_both_runs_have_them(
-    fast: Side, fast_and_slow: Comparison, uncertain_run: Path, tmp_path: Path
+    fast: ComparedRun, fast_and_slow: Comparison, uncertain_run: Path, tmp_path: Path
 ) -> None:
     """Else a line says how to have them."""
     rough = _changed_run(uncertain_run, tmp_path / "rough", {"velocity": 1.2e-3})
@@ -722,7 +722,7 @@ def test_runs_have_the_velocity_in_common_unless_it_says_little(
     mean over walkers of both directions says little.
     """
     run = run_directory(run=TINY)
-    level = Side("level", case_of(run), run)
+    level = ComparedRun("level", case_of(run), run)
     both_ways = {"velocity": 1e-3, "facings_differ": True, "facing_left": 3}
     comparison = compare_runs(level, _changed_run(run, tmp_path / "both", both_ways | numbers))
     marked = re.search(r"\nvelocity \(mm/s\) +[\d.]+ +1 facing up ", comparison.text)

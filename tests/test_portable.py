@@ -25,7 +25,7 @@ from walkers.physics.reynolds import _logarithmic_slope
 from walkers.runner.binary import find_engine
 from walkers.runner.manifest import read_manifest
 from walkers.runner.run_directory import case_of
-from walkers.runs.comparison import Side, compare_runs
+from walkers.runs.comparison import ComparedRun, compare_runs
 from walkers.runs.making import BridgeTablesDiffer
 from walkers.templates.deck import BRIDGES_NAME, bridge_tables_digest, render_deck
 
@@ -240,8 +240,8 @@ def test_the_bridge_tables_of_a_run_are_those_that_its_case_has(pile_run: Path) 
 def test_a_comparison_names_the_run_with_other_bridge_tables(tmp_path: Path) -> None:
     case = load_case("fig1b", {"run.cycles": 4})
     run = run_case(case, tmp_path).directory
-    mine = Side("mine", case, run)
-    yours = Side("yours", case, run)
+    mine = ComparedRun("mine", case, run)
+    yours = ComparedRun("yours", case, run)
     assert "bridge tables" not in compare_runs(mine, yours).text
     manifest = read_manifest(run) | {"bridge_tables": "0" * 64}
     (run / "manifest.json").write_text(json.dumps(manifest))

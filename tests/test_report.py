@@ -29,7 +29,7 @@ from tests.conftest import PATIENCE, document, make_case, to_toml, wait_for
 from walkers.inputs.sweep import expand
 from walkers.postprocess.measure.caption import caption
 from walkers.postprocess.measure.motion import Motion, read_bridges, read_motion
-from walkers.postprocess.measure.numbers import number_text, rows
+from walkers.postprocess.measure.numbers import rows, text_and_unit
 from walkers.postprocess.measure.results import not_computed, read_results
 from walkers.postprocess.measure.tables import read_table
 from walkers.postprocess.show.figures import figures_of
@@ -462,7 +462,7 @@ def test_words_and_numbers_of_velocities_have_three_decimals(number: float, text
 )
 def test_words_and_numbers_have_the_units_that_people_use(unit: str, text: tuple[str, str]) -> None:
     """0.25 of an SI unit; 0.25 rad are 14.32°."""
-    assert number_text(0.25, unit) == text
+    assert text_and_unit(0.25, unit) == text
 
 
 def test_the_caption_of_a_slope_says_where_up_is() -> None:

@@ -40,7 +40,7 @@ from walkers.runner.audit import check_audit
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import RunBusy
 from walkers.runs.by_hand import as_run, take_in, write_folder
-from walkers.runs.comparison import Comparison, Side, compare_runs
+from walkers.runs.comparison import ComparedRun, Comparison, compare_runs
 from walkers.runs.listing import run_text
 from walkers.runs.making import make_runs, progress_at
 from walkers.runs.names import (
@@ -64,7 +64,7 @@ from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import SweepOptions, run_sweep
 from walkers.sweeps.site import load_site
 from walkers.sweeps.spread import Spread, figures_of_spread, run_spread
-from walkers.sweeps.table import SweepTable, describe_status, short_text, table_of
+from walkers.sweeps.table import SweepTable, aligned_table, describe_status, table_of
 from walkers.sweeps.workers import Failure
 
 if TYPE_CHECKING:
@@ -811,7 +811,7 @@ class Sweep:
     def describe(self) -> str:
         """The status of the points, their failures, and the table in mm, mm/s, nJ and degrees."""
         frame = self._table.frame
-        return f"{describe_status(frame)}\n\n{short_text(frame.drop(columns='run'))}"
+        return f"{describe_status(frame)}\n\n{aligned_table(frame.drop(columns='run'))}"
 
     def _repr_html_(self) -> str:
         """The table in a notebook."""
@@ -1086,14 +1086,14 @@ def compare(
     return compare_runs(*apply_all(_side, references))
 
 
-def _side(named: Reference) -> Side:
+def _side(named: Reference) -> ComparedRun:
     """A side of a comparison: a run or a case, with the words that name it."""
     case = named.case
     directory = named.finished_run
     is_run = named.kind == "run" and not named.means_case
     name = directory.name if directory and is_run else str(named.given)
     changes = [f"{key}={value}" for key, value in named.changes.items()]
-    return Side(" ".join([name, *changes]), case, directory)
+    return ComparedRun(" ".join([name, *changes]), case, directory)
 
 
 def climb(

@@ -370,7 +370,7 @@ def table_in(annotation: Any) -> type[ConfigTable] | None:
     return None
 
 
-def table_of(field: FieldInfo | None) -> type[ConfigTable] | None:
+def table_class_of(field: FieldInfo | None) -> type[ConfigTable] | None:
     """The class of the tables that a field contains; None for another field, and for no field."""
     return table_in(field.annotation) if field else None
 
@@ -403,7 +403,7 @@ def contradictions(model: type[ConfigTable], document: Any, place: str = "") -> 
     given = {name: value for name, value in document.items() if value != []}
     yield from model.problems(given, place)
     for name, value in document.items():
-        table = table_of(table_keys(model).get(name))
+        table = table_class_of(table_keys(model).get(name))
         if table is None:
             continue
         inner_place = key_within(place, name)
@@ -420,7 +420,7 @@ def alternatives(model: type[ConfigTable], name: str) -> set[str]:
     table: type[ConfigTable] | None = model
     if path:
         names_in_path = [part for part in path if isinstance(part, str)]
-        table = table_of(dotted_keys(model).get(".".join(names_in_path)))
+        table = table_class_of(dotted_keys(model).get(".".join(names_in_path)))
     if table is None:
         return set()
     excluded = set()

@@ -21,8 +21,8 @@ from walkers.inputs.config_table import (
     ConfigTable,
     dotted_keys,
     example_of,
+    table_class_of,
     table_keys,
-    table_of,
 )
 from walkers.inputs.keys import MISSING, joined, parts_of, value_at
 from walkers.inputs.units import AUTO, WRITTEN
@@ -74,7 +74,7 @@ class _Place:
     @property
     def table(self) -> type[ConfigTable] | None:
         """The class of the tables at the place; None if its value is no table."""
-        return table_of(self.field)
+        return table_class_of(self.field)
 
     @property
     def meaning(self) -> str:
@@ -280,7 +280,7 @@ def check_key(model: type[ConfigTable], key: str) -> None:
     field = dotted_keys(model).get(".".join(parts))
     if field is None:
         raise key_error(key, _unknown_key(parts, model, "a case"))
-    if table_of(field):
+    if table_class_of(field):
         raise key_error(key, "is a table of a case; expected one of its keys")
 
 
@@ -316,7 +316,7 @@ def _keys_of_table(tables: Sequence[str], model: type[BaseModel]) -> list[str]:
     if not tables:
         return list(table_keys(model))
     fields = dotted_keys(model)
-    table = table_of(fields.get(_general_key(tables, fields)))
+    table = table_class_of(fields.get(_general_key(tables, fields)))
     if table is None:
         return []
     return list(table_keys(table))
@@ -333,7 +333,7 @@ def _fields_by_suggested_key(model: type[BaseModel]) -> dict[str, FieldInfo]:
 def _same_key_elsewhere(name: str, fields: Mapping[str, FieldInfo]) -> str:
     """A suggestion of the first key of this name in another table; empty if there is none."""
     for key, field in fields.items():
-        is_plain = "*" not in key and not table_of(field)
+        is_plain = "*" not in key and not table_class_of(field)
         if is_plain and key.split(".")[-1] == name:
             return f'; did you mean "{key}"?'
     return ""

@@ -49,7 +49,7 @@ _OTHER_BRIDGE_TABLES = (
 
 
 @dataclass(frozen=True)
-class Side:
+class ComparedRun:
     """One of the two runs or cases that are compared.
 
     Attributes
@@ -123,7 +123,7 @@ class _ComparedNumber:
         return self.first != self.second
 
 
-def compare_runs(first: Side, second: Side) -> Comparison:
+def compare_runs(first: ComparedRun, second: ComparedRun) -> Comparison:
     """Compare two runs, or cases that were not run.
 
     Results are compared if both sides have a finished run.
@@ -194,7 +194,7 @@ def _parameters_text(parameters: Sequence[_Parameter], names: Sequence[str]) -> 
     return aligned(rows)
 
 
-def _has_other_bridge_tables(side: Side) -> bool:
+def _has_other_bridge_tables(side: ComparedRun) -> bool:
     """Whether a finished run has other bridge tables than this program computes for its case."""
     if side.directory is None or side.case.liquid.law not in LAWS:
         return False

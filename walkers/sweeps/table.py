@@ -550,7 +550,7 @@ def _cell(value: Any, factor: float, unit: str) -> str:
     return rounded(value * factor, unit)
 
 
-def short_text(frame: pd.DataFrame) -> str:
+def aligned_table(frame: pd.DataFrame) -> str:
     """The `cells_of` a table, with a line below for the results that are the same at all points."""
     cells, same = cells_of(frame)
     text = aligned([[*cells], *cells.to_numpy().tolist()], right=range(len(cells.columns)))
@@ -643,5 +643,5 @@ def describe_status(frame: pd.DataFrame) -> str:
         point = f"  interrupted  point {row.point}"
         lines.append(f"{point}: {row.message}")
     if frame.attrs["until_below"] is not None:
-        lines.append(indent(short_text(thresholds(frame)), "  "))
+        lines.append(indent(aligned_table(thresholds(frame)), "  "))
     return "\n".join(lines)

@@ -31,7 +31,7 @@ from walkers.templates.layout import (
 from walkers.templates.parameters import (
     PRINTED,
     STATUS_LINES_PER_CYCLE,
-    Parameter,
+    DeckParameter,
     derived_parameters,
     drive_parameters,
     in_cycles,
@@ -497,7 +497,7 @@ def _template_values(plan: Plan, layout: DeckLayout, files: Mapping[str, str]) -
 
 def _parameters(
     plan: Plan, contacts: Sequence[Contact], scalable_liquid: BridgeLiquid | None
-) -> list[Parameter]:
+) -> list[DeckParameter]:
     """The parameters of a deck that a user may edit, in the order of its lines."""
     case = plan.case
     stable_step = min(vars(limits_of(case)).values())

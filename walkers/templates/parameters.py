@@ -28,7 +28,7 @@ _COMMENT_COLUMN = 55
 
 
 @dataclass(frozen=True)
-class Parameter:
+class DeckParameter:
     """A ``string`` variable of a deck.
 
     Attributes
@@ -96,7 +96,7 @@ def vector_along(name: str, direction: Vector) -> str:
 # --- parameters that a user may edit --------------------------------------------------------------
 
 
-def drive_parameters(case: Case, *, shaken: bool) -> list[Parameter]:
+def drive_parameters(case: Case, *, shaken: bool) -> list[DeckParameter]:
     """Frequencies, accelerations and phases of the harmonics, and the frequency of the cycle.
 
     Parameters
@@ -111,24 +111,24 @@ def drive_parameters(case: Case, *, shaken: bool) -> list[Parameter]:
     parameters = []
     for harmonic, ending in zip(harmonics, endings, strict=True):
         frequency = number_text(harmonic.frequency)
-        parameters.append(Parameter(f"frequency{ending}", frequency, "Hz"))
+        parameters.append(DeckParameter(f"frequency{ending}", frequency, "Hz"))
         if shaken:
             acceleration = number_text(harmonic.peak_acceleration)
-            parameters.append(Parameter(f"peak_acceleration{ending}", acceleration, "m/s^2"))
+            parameters.append(DeckParameter(f"peak_acceleration{ending}", acceleration, "m/s^2"))
         if len(harmonics) > 1 or harmonic.phase:
-            parameters.append(Parameter(f"phase{ending}", number_text(harmonic.phase), "rad"))
+            parameters.append(DeckParameter(f"phase{ending}", number_text(harmonic.phase), "rad"))
     if len(harmonics) != 1:
         note = "of a cycle"
         if harmonics:
             note += ", the common period of all: to be changed with them"
         frequency = number_text(case.excitation.frequency)
-        parameters.append(Parameter("cycle_frequency", frequency, "Hz", note))
+        parameters.append(DeckParameter("cycle_frequency", frequency, "Hz", note))
     return parameters
 
 
 def length_parameters(
     case: Case, stable_step: float, rest_steps: int | None, drive_steps: int | None
-) -> list[Parameter]:
+) -> list[DeckParameter]:
     """Steps of a cycle, steps of rest and cycles of a deck.
 
     Parameters
@@ -145,15 +145,17 @@ def length_parameters(
     run = case.run
     note = f"a multiple of {run.samples_per_cycle} for which the time step is below "
     note += f"{stable_step:.3g} s"
-    parameters = [Parameter("steps_per_cycle", str(run.steps_per_cycle), note=note)]
+    parameters = [DeckParameter("steps_per_cycle", str(run.steps_per_cycle), note=note)]
     if rest_steps:
         note = "before the drive, in which the beads come to rest"
-        parameters.append(Parameter("rest_steps", str(rest_steps), note=note))
+        parameters.append(DeckParameter("rest_steps", str(rest_steps), note=note))
     if drive_steps is not None and drive_steps % run.steps_per_cycle == 0:
         note = "of the drive"
         if run.continuation:
             note += f"; {run.continuation}"
-        parameters.append(Parameter("cycles", str(drive_steps // run.steps_per_cycle), note=note))
+        parameters.append(
+            DeckParameter("cycles", str(drive_steps // run.steps_per_cycle), note=note)
+        )
     return parameters
 
 
@@ -163,7 +165,7 @@ def material_parameters(
     scalable_liquid: BridgeLiquid | None,
     *,
     with_density: bool,
-) -> list[Parameter]:
+) -> list[DeckParameter]:
     """Gravity and the materials, as far as they are the same for all beads.
 
     Parameters
@@ -179,26 +181,26 @@ def material_parameters(
     """
     parameters = []
     if case.environment.gravity > 0:
-        parameters.append(Parameter("gravity", number_text(case.environment.gravity), "m/s^2"))
+        parameters.append(DeckParameter("gravity", number_text(case.environment.gravity), "m/s^2"))
     if with_density:
         density = number_text(case.beads.density)
-        parameters.append(Parameter("density", density, "kg/m^3", "of the beads"))
+        parameters.append(DeckParameter("density", density, "kg/m^3", "of the beads"))
     moduli = {contact.youngs_modulus for contact in (*contacts, case.contact)}
     if len(moduli) == 1:
         modulus = number_text(contacts[0].youngs_modulus)
         note = "softer than the material, for a longer time step; "
         note += "walkers run --accuracy measures its error"
-        parameters.append(Parameter("youngs_modulus", modulus, "Pa", note))
-    parameters.append(Parameter("poissons_ratio", number_text(case.contact.poissons_ratio)))
+        parameters.append(DeckParameter("youngs_modulus", modulus, "Pa", note))
+    parameters.append(DeckParameter("poissons_ratio", number_text(case.contact.poissons_ratio)))
     if len(contacts) == 1:
         parameters += _contact_parameters(contacts[0])
     if scalable_liquid is not None:
         viscosity = number_text(scalable_liquid.viscosity)
-        parameters.append(Parameter("viscosity", viscosity, "Pa s", "of the bridges"))
+        parameters.append(DeckParameter("viscosity", viscosity, "Pa s", "of the bridges"))
     return parameters
 
 
-def _contact_parameters(contact: Contact) -> list[Parameter]:
+def _contact_parameters(contact: Contact) -> list[DeckParameter]:
     """Restitution and the coefficients of friction of a deck with one surface of beads."""
     keys = ["restitution", "friction.bead_bead", "friction.bead_wall"]
     if contact.rolling_friction > 0:
@@ -206,7 +208,7 @@ def _contact_parameters(contact: Contact) -> list[Parameter]:
     parameters = []
     for key in keys:
         value = contact.value_of(key)
-        parameters.append(Parameter(key.replace(".", "_"), number_text(value)))
+        parameters.append(DeckParameter(key.replace(".", "_"), number_text(value)))
     return parameters
 
 
@@ -215,7 +217,7 @@ def _contact_parameters(contact: Contact) -> list[Parameter]:
 
 def derived_parameters(
     case: Case, *, shaken: bool, start_velocity: Sequence[float]
-) -> list[Parameter]:
+) -> list[DeckParameter]:
     """Amplitudes and velocities of the walls, and the time step, as formulas.
 
     Parameters
@@ -235,11 +237,15 @@ def derived_parameters(
         acceleration = f"v_peak_acceleration{ending}"
         angular_frequency = f"(2.0*PI*v_frequency{ending})"
         amplitude = f"$({acceleration}/{angular_frequency}^2)"
-        parameters.append(Parameter(f"amplitude{ending}", amplitude, "m", "of the displacement"))
+        parameters.append(
+            DeckParameter(f"amplitude{ending}", amplitude, "m", "of the displacement")
+        )
         if velocity_has_name:
             velocity = f"$({acceleration}/{angular_frequency})"
-            parameters.append(Parameter(f"peak_velocity{ending}", velocity, "m/s", "of the walls"))
-    parameters.append(Parameter("time_step", _time_step_text(case), "s"))
+            parameters.append(
+                DeckParameter(f"peak_velocity{ending}", velocity, "m/s", "of the walls")
+            )
+    parameters.append(DeckParameter("time_step", _time_step_text(case), "s"))
     return parameters
 
 

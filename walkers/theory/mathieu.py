@@ -152,10 +152,10 @@ def turning_rate(case: Case) -> float | None:
     Similarly, rolling friction resists sideways rolling by μ F R/|ω|, with the engine's model of
     constant torque; it is left out of the axial motion.
     """
-    axial = _axial_motion(case)
+    walker = Walker.of_case(case)
+    axial = _axial_motion(case, walker)
     if axial is None:
         return None
-    walker = Walker.of_case(case)
     frequency = case.excitation.frequency
     speeds = np.maximum(np.abs(axial.sliding), _SLOWEST)
     sliding_resistance = walker.friction * axial.normal / speeds
@@ -192,10 +192,9 @@ class _AxialMotion:
     """Torque of the other bead on each bead, N m, shape (2, steps)."""
 
 
-def _axial_motion(case: Case) -> _AxialMotion | None:
+def _axial_motion(case: Case, walker: Walker) -> _AxialMotion | None:
     """The axial motion of the dimer of a case; None if it is not periodic."""
     dimer = dimer_of(case)
-    walker = Walker.of_case(case)
     frequency = case.excitation.frequency
     peak = case.excitation.peak_acceleration
     steady = case.axial_gravity

@@ -12,10 +12,10 @@ from numba import njit
 
 from walkers.arrays import BoolArray, FloatArray
 
-Vector = tuple[float, float, float]
+PerContact = tuple[float, float, float]
 """A value for each of the three contacts."""
 Effect = Callable[
-    [Vector, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]
+    [PerContact, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]
 ]
 """A further force law, as `walkers.theory.motion.predict_motion` describes it."""
 
@@ -232,7 +232,7 @@ def _stage(  # noqa: PLR0913, PLR0917
     parameters: FloatArray,
     end: float,
     length: float,
-    velocity: Vector,
+    velocity: PerContact,
     work: FloatArray,
 ) -> bool:
     """An implicit Euler step from sliding velocities to the end of a stage, in place.
@@ -267,8 +267,8 @@ def _settle(  # noqa: PLR0913, PLR0917
     table: FloatArray,
     mu: FloatArray,
     seconds: float,
-    free: Vector,
-    rest: Vector,
+    free: PerContact,
+    rest: PerContact,
     work: FloatArray,
 ) -> bool:
     """Find the friction forces and modes at the end of a stage, in place.
@@ -312,7 +312,7 @@ def _settle(  # noqa: PLR0913, PLR0917
 
 
 @njit(cache=True)
-def _less(vector: Vector, factor: float, change: Vector) -> Vector:
+def _less(vector: PerContact, factor: float, change: PerContact) -> PerContact:
     """A vector minus a multiple of another one."""
     return (
         vector[0] - factor * change[0],
@@ -322,7 +322,7 @@ def _less(vector: Vector, factor: float, change: Vector) -> Vector:
 
 
 @njit(cache=True)
-def _times(table: FloatArray, first: int, vector: FloatArray | Vector) -> Vector:
+def _times(table: FloatArray, first: int, vector: FloatArray | PerContact) -> PerContact:
     """A matrix of a table, from its first row on, times a vector."""
     return (
         _row(table, first, vector),
@@ -332,13 +332,13 @@ def _times(table: FloatArray, first: int, vector: FloatArray | Vector) -> Vector
 
 
 @njit(cache=True)
-def _row(matrix: FloatArray, row: int, vector: FloatArray | Vector) -> float:
+def _row(matrix: FloatArray, row: int, vector: FloatArray | PerContact) -> float:
     """One row of a matrix times a vector."""
     return matrix[row, 0] * vector[0] + matrix[row, 1] * vector[1] + matrix[row, 2] * vector[2]
 
 
 @njit(cache=True)
-def _solved(rows: FloatArray, right: FloatArray) -> Vector:
+def _solved(rows: FloatArray, right: FloatArray) -> PerContact:
     """The solution of three linear equations, by Cramer's rule."""
     a, b, c = rows[0, 0], rows[0, 1], rows[0, 2]
     d, e, f = rows[1, 0], rows[1, 1], rows[1, 2]

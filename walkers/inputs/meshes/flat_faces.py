@@ -21,7 +21,7 @@ _MOST_FITS = 20
 """Largest number of planes that are fitted to a growing face."""
 
 
-class Plane(NamedTuple):
+class FittedPlane(NamedTuple):
     """The plane of a face: a point (m), and its unit normal toward the beads, shape (3,) each."""
 
     point: FloatArray
@@ -65,7 +65,7 @@ class FlatFaces:
             self.neighbours_of[first].append(second)
             self.neighbours_of[second].append(first)
 
-    def grown(self) -> tuple[IntArray, dict[int, Plane]]:
+    def grown(self) -> tuple[IntArray, dict[int, FittedPlane]]:
         """Let faces grow, from the largest triangles on. Call it once.
 
         Returns
@@ -79,7 +79,7 @@ class FlatFaces:
         for seed in np.argsort(-self.areas, kind="stable").tolist():
             if self.faces[seed] >= 0:
                 continue
-            plane = Plane(self.points[self.corner_lists[seed][0]], self.normals[seed])
+            plane = FittedPlane(self.points[self.corner_lists[seed][0]], self.normals[seed])
             members = self._connected(seed, plane)
             for _ in range(_MOST_FITS):
                 if len(members) == 1:
@@ -97,14 +97,14 @@ class FlatFaces:
             planes[seed] = plane
         return self.faces, planes
 
-    def _fitted_plane(self, members: list[int], toward: FloatArray) -> Plane:
+    def _fitted_plane(self, members: list[int], toward: FloatArray) -> FittedPlane:
         """The plane nearest to the corners of triangles, with a normal toward a direction."""
         corners = self.points[np.unique(self.triangles[members])]
         middle = corners.mean(axis=0)
         normal = np.linalg.svd(corners - middle, full_matrices=False)[2][2]
-        return Plane(middle, normal if normal @ toward > 0.0 else -normal)
+        return FittedPlane(middle, normal if normal @ toward > 0.0 else -normal)
 
-    def _connected(self, seed: int, plane: Plane) -> list[int]:
+    def _connected(self, seed: int, plane: FittedPlane) -> list[int]:
         """Triangles in a plane, and of no face yet, that are connected with one of them.
 
         There are none if the triangle ``seed`` itself is not in the plane.

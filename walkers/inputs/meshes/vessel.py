@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from walkers.arrays import FloatArray, IntArray, Vector
 from walkers.inputs.meshes.facet import Facet, HalfSpace
-from walkers.inputs.meshes.flat_faces import FlatFaces, Plane
+from walkers.inputs.meshes.flat_faces import FittedPlane, FlatFaces
 from walkers.inputs.meshes.triangles import (
     SAME_POINT,
     evaluated,
@@ -139,13 +139,13 @@ class Vessel:
     # --- faces ----------------------------------------------------------------------------------
 
     @cached_property
-    def _faces_and_planes(self) -> tuple[IntArray, dict[int, Plane]]:
+    def _faces_and_planes(self) -> tuple[IntArray, dict[int, FittedPlane]]:
         """Number of the face of each triangle, and the plane of each face."""
         flat_faces = FlatFaces(self.points, self.triangles, self._area_vectors, self.neighbours)
         return flat_faces.grown()
 
     @property
-    def _planes_of_faces(self) -> dict[int, Plane]:
+    def _planes_of_faces(self) -> dict[int, FittedPlane]:
         """The plane of each face by the number of the face."""
         _, planes = self._faces_and_planes
         return planes

@@ -132,7 +132,7 @@ def state(numbers: Mapping[str, Any]) -> str:
     for verb in ("stops", "starts"):
         peak_acceleration = numbers.get(f"{verb}_at", nan)
         if isfinite(peak_acceleration):
-            text, unit = number_text(peak_acceleration, "m/s^2")
+            text, unit = text_and_unit(peak_acceleration, "m/s^2")
             thresholds.append(f"{verb} at {text} {unit}")
     if thresholds:
         return ", ".join(thresholds)
@@ -169,10 +169,10 @@ def short_text(numbers: Mapping[str, Any]) -> str:
     state_of_walkers = state(numbers)
     if state_of_walkers:
         return state_of_walkers
-    velocity, _ = number_text(numbers[main], "m/s")
+    velocity, _ = text_and_unit(numbers[main], "m/s")
     if main == "right_facing":
         right, left = direction_names(uphill=numbers["goes_uphill"])
-        left_velocity, _ = number_text(numbers["left_facing"], "m/s")
+        left_velocity, _ = text_and_unit(numbers["left_facing"], "m/s")
         return f"{velocity} mm/s facing {right}, {left_velocity} facing {left}"
     if main == "axial_velocity":
         return f"{velocity} mm/s up the slope"
@@ -204,7 +204,7 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
             continue
         quantity = declared(name)
         label = _label(quantity, numbers)
-        text, unit = number_text(number, quantity.unit)
+        text, unit = text_and_unit(number, quantity.unit)
         listed.append(Row(name, label, text, unit, _errors(numbers, quantity)))
     return listed
 
@@ -270,7 +270,7 @@ def leaves_out_facing_down(quantity: Quantity, numbers: Mapping[str, Any]) -> bo
     return bool(numbers["goes_uphill"] and numbers.get("facing_left") and is_mean_over_up)
 
 
-def number_text(number: float, unit: str) -> tuple[str, str]:
+def text_and_unit(number: float, unit: str) -> tuple[str, str]:
     """Write a number as text in the displayed unit.
 
     Parameters
@@ -300,8 +300,8 @@ def _errors(numbers: Mapping[str, Any], quantity: Quantity) -> str:
     """
     parts = []
     if quantity.name == "orientation_end" and numbers["walkers"] > 1:
-        smallest, _ = number_text(numbers["orientation_smallest"], quantity.unit)
-        largest, _ = number_text(numbers["orientation_largest"], quantity.unit)
+        smallest, _ = text_and_unit(numbers["orientation_smallest"], quantity.unit)
+        largest, _ = text_and_unit(numbers["orientation_largest"], quantity.unit)
         parts.append(f"walkers {smallest} to {largest}")
     scatter = numbers.get(quantity.error, nan)
     if isfinite(scatter):
