@@ -1083,6 +1083,22 @@ def test_what_settles_slowly_runs_in_full(dimers: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
+    ("angle", "until_steady"),
+    [
+        ("-80 deg", False),
+        ("0 deg", True),
+        ("80 deg", False),
+    ],
+)
+def test_walkers_end_when_steady_only_if_they_start_near_the_axis(
+    angle: str, until_steady: bool
+) -> None:
+    """Near is an angle below 0.1 rad to either side; 80° are 1.4 rad."""
+    case = build_case({**document(dimers={"angle": angle}), "run": {}}, name="test")
+    assert case.run.until_steady == until_steady
+
+
+@pytest.mark.parametrize(
     ("table", "until_steady", "cycles", "settling_cycles"),
     [
         pytest.param({}, True, 60, 20, id="none"),
