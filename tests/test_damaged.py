@@ -3,6 +3,7 @@
 A command that meets any of them says so in one line.
 """
 
+import errno
 import json
 import os
 import re
@@ -50,7 +51,14 @@ from walkers.postprocess.show.paraview import write_vtk
 from walkers.postprocess.show.report.run import result_html
 from walkers.runner.failures import DiskFull, RunBusy
 from walkers.runner.launch import launch
-from walkers.runner.run_directory import CASE_NAME, FIRST_SEGMENT, case_of, locked, recomputed
+from walkers.runner.run_directory import (
+    CASE_NAME,
+    FIRST_SEGMENT,
+    case_of,
+    locked,
+    recomputed,
+    write_errors_as_failures,
+)
 from walkers.sweeps.table import load_table
 from walkers.templates.deck import Deck, render_deck
 from walkers.templates.layout import BEAD_COLUMNS, MEAN_SPIN_COLUMNS
@@ -745,6 +753,25 @@ def test_a_case_file_that_cannot_be_written_is_not_left_behind(tmp_path: Path) -
         assert list(disk.iterdir()) == [ballast]
         ballast.unlink()
         call("new", str(disk / "x"), check=True)
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(errno.ENOSPC, id="no space left"),
+        pytest.param(errno.EDQUOT, id="quota exceeded"),
+    ],
+)
+def test_a_run_that_cannot_be_written_for_want_of_space_fails_by_a_full_disk(
+    number: int, tmp_path: Path
+) -> None:
+    """6 MB are needed; how many are free depends on the disk."""
+    run = tmp_path / "run.incomplete"
+    with (
+        pytest.raises(DiskFull, match=rf"disk full: 6 MB are .* are free \(see {run}\)"),
+        write_errors_as_failures(run, needed=6_000_000),
+    ):
+        raise OSError(number, os.strerror(number), str(run / "beads.bin"))
 
 
 @pytest.fixture
