@@ -41,7 +41,7 @@ from tests.conftest import (
 )
 from walkers.errors import InputError
 from walkers.files import read_json, write_json
-from walkers.inputs.resolving.loads import dimer_of
+from walkers.inputs.resolving.loads import dimer_of, path_length
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.progress import Progress
@@ -165,6 +165,28 @@ def test_two_rolling_frictions_may_differ_within_a_deck() -> None:
     low = make_deck_case({"contact": {"rolling_friction": 0.003}})
     high = make_deck_case({"contact": {"rolling_friction": 0.006}})
     assert sharing_key(low) == sharing_key(high)
+
+
+@pytest.mark.parametrize(
+    ("spacing", "shared"),
+    [
+        pytest.param("17.1 mm", False, id="1.9 path lengths"),
+        pytest.param("18.9 mm", True, id="2.1 path lengths"),
+    ],
+)
+def test_walkers_share_a_deck_from_a_spacing_of_two_path_lengths(
+    spacing: str, shared: bool
+) -> None:
+    """Walkers that stand closer could meet, and would have other neighbours in a shared deck.
+
+    The path length is that of 0.3 s at 0.3 times the peak velocity of 78.0 mm/s, plus twice the
+    length of a dimer, 0.99 mm: 9.00 mm.
+    """
+    dimers = {"replicates": 2, "spacing": spacing}
+    first = make_deck_case({"dimers": dimers, "run": {"seed": 1}})
+    second = make_deck_case({"dimers": dimers, "run": {"seed": 2}})
+    assert path_length(first) == pytest.approx(9.0e-3, rel=1e-3)
+    assert (sharing_key(first) == sharing_key(second)) == shared
 
 
 def test_no_deck_is_composed_of_cases_that_may_not_share_it() -> None:
