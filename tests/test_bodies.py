@@ -801,8 +801,8 @@ def collective_numbers() -> dict[str, Any]:
     """Numbers of four walkers that walk at 1 mm/s for 10 s, in 101 frames.
 
     The first two head right and left, meet at 5 s and rest. The others head right and along y; they
-    are joined from 1 to 3 s, at half the speed, and part. In the last frame the fourth one is held
-    by a wall.
+    are joined from 1 to 3 s, at half the speed until a wall holds them at 2.5 s, and part. In the
+    last frame the fourth one is held by a wall.
     """
     time = np.linspace(0.0, 10.0, 101)
     heading = np.array([[1.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -810,10 +810,12 @@ def collective_numbers() -> dict[str, Any]:
     size[50:, :2] = 2
     size[10:31, 2:] = 2
     held = np.zeros((101, 4), dtype=bool)
+    held[25:31, 2:] = True
     held[-1, 3] = True
     speed = np.full((100, 4), 1e-3)
     speed[50:, :2] = 0.0
-    speed[10:30, 2:] = 0.5e-3
+    speed[10:25, 2:] = 0.5e-3
+    speed[25:30, 2:] = 0.0
     path = np.concatenate([np.zeros((1, 4)), np.cumsum(0.1 * speed, axis=0)])
     course = TrayCourse(
         time=time,
@@ -854,8 +856,12 @@ def test_the_order_of_headings_is_that_along_the_axis_and_of_their_mean(
 
 
 def test_joined_walkers_have_a_speed_of_their_own(collective_numbers: dict[str, Any]) -> None:
-    """Walkers are joined in 140 intervals between frames: 100 at rest, 40 at half the speed."""
-    ratio = 40 * 0.5 / 140
+    """Walkers that no wall holds are joined in 128 intervals between frames.
+
+    The first two rest in 2 · 50 of them. The others have half the speed in 2 · 14, between the
+    frames of 1.0 and 2.4 s; in that of 2.5 s they are held.
+    """
+    ratio = 28 * 0.5 / 128
     assert collective_numbers["free_speed"] == pytest.approx(1e-3)
     assert collective_numbers["joined_speed"] == pytest.approx(ratio * 1e-3)
     assert collective_numbers["speed_ratio"] == pytest.approx(ratio)
