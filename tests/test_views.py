@@ -20,7 +20,7 @@ from PIL import Image
 from scipy.interpolate import Akima1DInterpolator
 
 import walkers
-from tests.conftest import call
+from tests.conftest import BRIEF, call
 from tests.printed import letters, spoilt
 from walkers.errors import InputError
 from walkers.inputs.resolving.loads import bridge_at_rest
@@ -374,6 +374,17 @@ def test_a_lammps_dump_has_the_beads_and_walkers(directory: Path, tmp_path: Path
             [3, 1, 2, 0.3],
             [4, 2, 2, 0.2],
         ]
+
+
+def test_equal_beads_are_of_type_1_of_a_lammps_dump(
+    run_directory: Callable[..., Path], tmp_path: Path
+) -> None:
+    """Type 2 is for small beads beside large ones."""
+    directory = run_directory(dimers={"radii": ["0.25 mm", "0.25 mm"]}, run=BRIEF)
+    path = walkers.load(directory).export("lammps", tmp_path / "walk.lammpstrj")
+    for frame in lammps_frames(path):
+        assert frame.columns[1] == "type"
+        assert frame.rows[:, 1].tolist() == [1, 1]
 
 
 # --- figures ----------------------------------------------------------------------------------
