@@ -30,7 +30,7 @@ from tests.conftest import (
 )
 from walkers import load_case
 from walkers.files import read_json, scratch_folder, write_json
-from walkers.inputs.case_building import changed_case
+from walkers.inputs.case_building import build_case, changed_case
 from walkers.inputs.reading import shipped
 from walkers.inputs.toml import read_toml
 from walkers.postprocess.measure.uncertainty import ACCURACY_NAME, SPREAD_NAME, spread_of
@@ -680,6 +680,24 @@ def test_compared_runs_tell_their_bands_or_how_to_have_them(fast_and_slow: Compa
         "1 uncertain value belongs to both runs and may be equal in both: "
         "the bands may overlap although the difference is certain",
     ]
+
+
+def test_a_comparison_counts_the_uncertain_values_that_were_guessed(
+    run_directory: Callable[..., Path], fast: ComparedRun
+) -> None:
+    """The case gives a range of one friction; that of a wall of glass, 0.1 to 0.6, is a guess."""
+    tables = document(
+        run={**TINY, "cycles": 5},
+        boundary={"material": "glass"},
+        uncertain={"contact": {"friction": {"bead_bead": [0.05, 0.2]}}},
+    )
+    del tables["contact"]["friction"]["bead_wall"]
+    case = build_case(tables, name="test")
+    glass = ComparedRun("glass", case, run_directory(case))
+    assert (
+        "glass: velocity rests on 2 uncertain values, 1 guessed; "
+        "the band over the ranges is not computed (--spread)"
+    ) in compare_runs(fast, glass).text.splitlines()
 
 
 def test_a_comparison_says_that_scatter_is_no_error(fast_and_slow: Comparison) -> None:
