@@ -402,6 +402,32 @@ def test_pictures_of_a_run_without_dumps_are_refused(run_without_dumps: Path) ->
 # --- archives of a sweep --------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("contact_model", "sentence"),
+    [
+        pytest.param(
+            {**model_version(), "sources": {"forces.h": "0" * 64}},
+            "Some runs were made with other sources that compute the same forces.",
+            id="other sources",
+        ),
+        pytest.param(
+            None,
+            "Some runs were made with another version of the contact model, or do not record it",
+            id="not recorded",
+        ),
+    ],
+)
+def test_the_readme_of_a_sweep_tells_of_one_run_with_another_contact_model(
+    contact_model: dict[str, Any] | None, sentence: str, sweep_runs: Path, tmp_path: Path
+) -> None:
+    """The other run was made with the sources in the archive."""
+    runs = Path(shutil.copytree(sweep_runs, tmp_path / "runs"))
+    run = runs / Path(load_table(runs / "angles")["run"].iloc[1]).name
+    write_json(run / "manifest.json", {**read_manifest(run), "contact_model": contact_model})
+    readme = _text_in(write_archive(runs / "angles", tmp_path / "sweep.zip"), "README.md")
+    assert sentence in readme
+
+
 def test_an_archive_of_a_sweep_has_its_table(unpacked_sweep: Path, sweep_runs: Path) -> None:
     table = load_table(unpacked_sweep / "runs" / "angles")
     original = load_table(sweep_runs / "angles")
