@@ -23,7 +23,7 @@ DISTRIBUTIONS = ("uniform", "loguniform")
 
 @lru_cache(maxsize=4096)
 def parts_of(key: str) -> tuple[str | int, ...]:
-    """Names of tables and places in lists.
+    """Names of tables and keys, and indices of lists, from 0.
 
     Examples
     --------
@@ -35,7 +35,7 @@ def parts_of(key: str) -> tuple[str | int, ...]:
 
 
 def joined(parts: Sequence[str | int]) -> str:
-    """The dotted key of names of tables and places in lists; the inverse of `parts_of`."""
+    """The dotted key from names and indices; the inverse of `parts_of`."""
     key = ""
     for part in parts:
         key += f"[{part}]" if isinstance(part, int) else f".{part}"
@@ -43,7 +43,7 @@ def joined(parts: Sequence[str | int]) -> str:
 
 
 def value_at(document: Any, parts: Sequence[str | int]) -> Any:
-    """The value of nested tables and lists at a place; `MISSING` if there is no such place."""
+    """The value of nested tables and lists by names and indices; `MISSING` if there is none."""
     value = document
     for part in parts:
         try:

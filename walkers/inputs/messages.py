@@ -51,8 +51,8 @@ _SENTENCES = {
     "model_attributes_type": "expected a table [{key}]",
 }
 """Sentences by the type of pydantic's error, with words of its context and of `_wrong_value`."""
-_GIVEN_ELSEWHERE = {"beads": "a material", "liquid": "a liquid", "contact": "surfaces"}
-"""Entries of the library that give keys of these tables."""
+_LIBRARY_ENTRIES = {"beads": "a material", "liquid": "a liquid", "contact": "surfaces"}
+"""What a case may name instead of the keys of a table: an entry of the library has them."""
 _LISTS_OF_TABLES = re.compile(r"^(clusters|placed|drive\.harmonics)\.")
 """Start of the key of a table of which a case has several; a message suggests ``clusters[0].…``."""
 
@@ -62,7 +62,7 @@ class _Place:
     """Where a document is wrong."""
 
     parts: tuple[str | int, ...]
-    """Names of tables and places in lists."""
+    """Names of tables and indices of lists."""
     field: FieldInfo | None
     """The field of the key; None if the kind of file has no such key."""
 
@@ -221,11 +221,12 @@ def _wrong_length(place: _Place, document: Mapping[str, Any], expected: str) -> 
 
 
 def _missing(place: _Place) -> str:
-    """The message about a required key that the file leaves out."""
+    """The message about a required key or table that the file leaves out."""
     expected = f"a table [{place.key}]" if place.table else place.example
     message = f"missing; expected {expected}"
-    entry = _GIVEN_ELSEWHERE.get(str(place.parts[0]))
-    if entry and len(place.parts) > 1:
+    entry = _LIBRARY_ENTRIES.get(str(place.parts[0]))
+    is_key_of_table = len(place.parts) > 1  # the table itself must be there to name the entry
+    if entry and is_key_of_table:
         message += f", or {entry} of the library"
     return message
 
@@ -260,7 +261,7 @@ def _wrong_value(place: _Place, details: ErrorDetails) -> str:
 def _general_key(location: Sequence[str | int], keys: Collection[str]) -> str:
     """The key among those of a kind of file that stands for a key of a file.
 
-    It has no places in lists, and an asterisk for a name that the user gives.
+    It has no indices of lists, and an asterisk for a name that the user gives.
     """
     general = ""
     for part in location:
@@ -287,7 +288,8 @@ def check_key(model: type[ConfigTable], key: str) -> None:
 def _unknown_key(names: Sequence[str], model: type[BaseModel], file_kind: str) -> str:
     """The message about a key that does not exist.
 
-    It lists the keys of its table and suggests one that the user may mean.
+    It lists the keys of its table and suggests one that the user may mean. If there is no such
+    table, it only suggests one.
 
     Parameters
     ----------
@@ -300,7 +302,7 @@ def _unknown_key(names: Sequence[str], model: type[BaseModel], file_kind: str) -
     """
     *tables, name = names
     keys_of_table = _keys_of_table(tables, model)
-    fields = _fields_by_suggested_key(model)
+    fields = _fields_by_indexed_key(model)
     same_key_elsewhere = _same_key_elsewhere(name, fields)
     if not keys_of_table:
         return f"unknown key{suggestion('.'.join(names), fields) or same_key_elsewhere}"
@@ -322,8 +324,8 @@ def _keys_of_table(tables: Sequence[str], model: type[BaseModel]) -> list[str]:
     return list(table_keys(table))
 
 
-def _fields_by_suggested_key(model: type[BaseModel]) -> dict[str, FieldInfo]:
-    """The fields of a kind of file by their keys as a message suggests them."""
+def _fields_by_indexed_key(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """The fields of a kind of file by their keys, with the index [0] for lists of tables."""
     fields = {}
     for key, field in dotted_keys(model).items():
         fields[_LISTS_OF_TABLES.sub(r"\1[0].", key)] = field
