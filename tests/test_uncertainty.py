@@ -284,7 +284,7 @@ def test_no_final_angle_is_printed_if_some_walkers_turned_over(steep: walkers.Ru
 def test_the_final_angle_of_two_walkers_has_their_range(steep: walkers.Run) -> None:
     low, high = np.degrees(sorted(steep.walkers["orientation_end"]))
     error = printed_error(with_values(steep.result, walkers=2), "orientation_end")
-    assert error == f"walkers {rounded(low, '°')} to {rounded(high, '°')}"
+    assert error == f"from {rounded(low, '°')} to {rounded(high, '°')} among walkers"
 
 
 def test_the_final_angle_of_one_walker_has_no_range(steep: walkers.Run) -> None:

@@ -185,15 +185,23 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
     Parameters
     ----------
     numbers
-        The numbers of a result.
+        The numbers of a result in SI units, NaN where undefined.
 
     Returns
     -------
     list of Row
-        The numbers in displayed units, in the order of their declarations. Numbers that say nothing
-        about any walker are left out: velocities and steadiness of walkers that came apart, means
-        over two directions that differ or under a ramp, orientations of walkers of which some
-        turned round.
+        The numbers in displayed units, in the order of their declarations.
+
+    Notes
+    -----
+    These have no row:
+
+    - texts, truth values, and numbers that are not finite;
+    - what another row or a warning has: errors and bands, values of the case, conditions;
+    - counts and shares of exceptions if they are zero (``if_any`` in ``quantities.toml``);
+    - numbers that would mislead: velocities and steadiness of walkers that came apart, means over
+      two directions that differ or under a ramp, and the mean final angle if only some walkers
+      turned round.
     """
     listed = []
     for name in ordered(numbers.keys() - _hidden_numbers(numbers)):
@@ -302,7 +310,7 @@ def _errors(numbers: Mapping[str, Any], quantity: Quantity) -> str:
     if quantity.name == "orientation_end" and numbers["walkers"] > 1:
         smallest, _ = text_and_unit(numbers["orientation_smallest"], quantity.unit)
         largest, _ = text_and_unit(numbers["orientation_largest"], quantity.unit)
-        parts.append(f"walkers {smallest} to {largest}")
+        parts.append(f"from {smallest} to {largest} among walkers")
     scatter = numbers.get(quantity.error, nan)
     if isfinite(scatter):
         word = "resolution" if quantity.error.endswith("_within") else "scatter of copies"
