@@ -45,6 +45,16 @@ _SUPERSAMPLING = 1.5
 """Pixels that are drawn over those of the picture, in each direction."""
 _FLOOR_EXTENT = 6.0
 """Extent of the floor over that of the picture."""
+_CAMERA_DISTANCE = 10.0
+"""Distance of the camera from the middle of the view, over the height of the view.
+
+In a parallel projection it does not change the sizes in the picture; all beads must be in front."""
+_NEAREST_SHOWN = 0.1
+"""Smallest distance from the camera that is drawn, over the height of the view."""
+_FARTHEST_SHOWN = 40.0
+"""Largest distance from the camera that is drawn, over the larger side of the view."""
+_LINES_PER_EXTENT = 8.0
+"""About this many lines of a floor or a wall are across the larger side of the view."""
 
 
 @dataclass(frozen=True)
@@ -92,40 +102,47 @@ class Window:
     """
 
     def __init__(self, scene: Scene, size: Sequence[int]) -> None:
-        # Otherwise VTK first tries an X server, and prints that.
+        # Otherwise VTK first tries an X server, and prints an error if there is none.
         os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
         import pyvista as pv
 
         width, height = size
-        is_bare = scene.motion.case.boundary.bare
+        is_open_floor = scene.motion.case.boundary.bare
         self._scene = scene
         self._size = (width, height)
         finer_size = [round(_SUPERSAMPLING * width), round(_SUPERSAMPLING * height)]
-        # In software, smooth edges by a finer picture, and simple blending, take half of the time
-        # of VTK's own methods.
+        # VTK mostly renders in software here. There, a finer picture that is reduced afterwards
+        # smooths edges, and simple blending shows what is transparent, in half of the time of VTK's
+        # own anti-aliasing and order-independent blending.
         self._plotter = pv.Plotter(off_screen=True, window_size=finer_size, lighting="light kit")
         self._plotter.disable_anti_aliasing()
         self._plotter.renderer.SetUseOIT(False)
-        self._plotter.background_color = pv.Color(_GROUND if is_bare else "white")
+        self._plotter.background_color = pv.Color(_GROUND if is_open_floor else "white")
 
         height_mm = scene.height(width / height)
         extent_mm = max(height_mm, height_mm * width / height)
         self.pixels_per_mm = height / height_mm
-        self._camera_position, self._middle, up = scene.camera(10.0 * height_mm)
+        self._camera_position, self._middle, up = scene.camera(_CAMERA_DISTANCE * height_mm)
         self._plotter.camera_position = [self._camera_position, self._middle, up]
         self._plotter.camera.parallel_projection = True
         self._plotter.camera.parallel_scale = height_mm / 2.0
 
-        self._boundary = self._add_floor(extent_mm) if is_bare else self._add_walls(extent_mm)
-        self._plotter.camera.clipping_range = (0.1 * height_mm, 40.0 * extent_mm)
-        self._shadows = self._add_shadows() if is_bare else None
+        # Without a floor there is nothing on which shadows could lie.
+        self._shadows: _Copies | None = None
+        if is_open_floor:
+            self._boundary = self._add_floor(extent_mm)
+            self._shadows = self._add_shadows()
+        else:
+            self._boundary = self._add_walls(extent_mm)
+        nearest_mm = _NEAREST_SHOWN * height_mm
+        self._plotter.camera.clipping_range = (nearest_mm, _FARTHEST_SHOWN * extent_mm)
         count = len(scene.motion.radius)
         detail = next(detail for detail in _DETAILS if count < detail.beads)
         self._neck_grid = detail.necks
-        points, triangles, self._pale = beach_ball(detail.cells, scene.motion)
-        black = np.zeros((count, len(points), 3))
+        points, triangles, self._shade_of_point = beach_ball(detail.cells, scene.motion)
+        black = np.zeros((count, len(points), 3))  # until `picture` colours the beads
         self._beads = _Copies(self._plotter, points, triangles, 1e3 * scene.motion.radius, black)
-        self._beads.property.specular = 0.4
+        self._beads.reflection.specular = 0.4
         self._necks = self._add_necks()
 
     def picture(self, frame: float, bridges: IntArray = NO_BRIDGES) -> Picture:
@@ -183,7 +200,7 @@ class Window:
         """Colour the beads, turn them, and move them to their positions (m) and a shift (mm)."""
         scene = self._scene
         colours = scene.colours(scene.highlighted[int(frame)])
-        self._beads.colour(colours[self._pale].swapaxes(0, 1))
+        self._beads.colour(colours[self._shade_of_point].swapaxes(0, 1))
         rotations = None
         if scene.orientations is not None:
             rotations = rotations_at(scene.orientations, frame)
@@ -250,7 +267,7 @@ class Window:
         black[:, 3] = 255.0 * _SHADOW * (1.0 - distance**2) ** 2
         colours = np.tile(black, (len(radius), 1, 1))
         shadows = _Copies(self._plotter, disc.points, disc.regular_faces, radius, colours)
-        shadows.property.lighting = False
+        shadows.reflection.lighting = False
         return shadows
 
     def _add_floor(self, extent: float) -> list[pv.Actor]:
@@ -268,7 +285,9 @@ class Window:
         middle = self._middle * [1.0, 1.0, 0.0]
         low = middle + camera_path.min(axis=0) - half
         high = middle + camera_path.max(axis=0) + half
-        lines = pv.line_segments_from_points(floor_lines(low, high, round_below(extent / 8.0)))
+        lines = pv.line_segments_from_points(
+            floor_lines(low, high, round_below(extent / _LINES_PER_EXTENT))
+        )
         lines.translate([0.0, 0.0, -1e-3 * extent], inplace=True)
         return [self._add_lines(lines, _LINES)]
 
@@ -290,7 +309,7 @@ class Window:
         ]
         if self._scene.camera_path is not None:
             path_axis = int(np.argmax(np.ptp(self._scene.camera_path, axis=0)))
-            marks = self._marks(faces, path_axis, round_below(extent / 8.0))
+            marks = self._marks(faces, path_axis, round_below(extent / _LINES_PER_EXTENT))
             actors.append(self._add_lines(marks, _LINES))
         return actors
 
@@ -329,24 +348,26 @@ class Window:
 
 
 class _Copies:
-    """Copies of a unit mesh, one per bead, with the positions, orientations and colours of a frame.
+    """Copies of a ball or disc of radius 1, one per bead, which move, turn and change colour.
+
+    Until the first `move` they lie at the origin with radius 1.
 
     Parameters
     ----------
     plotter
         The plotter to which they are added.
     points : ndarray, shape (V, 3)
-        Points of the unit mesh.
+        Points of the ball or disc.
     triangles : ndarray of int, shape (T, 3)
         Corners of its triangles.
     radius : ndarray, shape (N,)
-        Radii of the beads, mm.
+        Radii of the beads, mm, to which `move` scales the copies.
     colours : ndarray, shape (N, V, 3 or 4)
         Colours of the points as for `colour`.
 
     Attributes
     ----------
-    property
+    reflection : pyvista.Property
         How they reflect light.
     """
 
@@ -370,12 +391,13 @@ class _Copies:
         self.colour(colours)
         self._mesh.point_data["Normals"] = np.asarray(self._mesh.points).copy()
         self._mesh.point_data.active_normals_name = "Normals"
-        # The invisible halves of spheres are half of the work.
+        # Culling skips the triangles that face away from the camera: half of a ball, never seen.
         actor = plotter.add_mesh(
             self._mesh, scalars="colour", rgb=True, smooth_shading=False, culling="back"
         )
-        self.property = actor.prop
-        self.property.interpolation = "Phong"  # with these normals; pyvista would compute others
+        self.reflection = actor.prop
+        # Set here: the option `smooth_shading` would replace these normals by computed ones.
+        self.reflection.interpolation = "Phong"
 
     def move(self, centres: FloatArray, rotations: FloatArray | None = None) -> None:
         """Move and turn the copies.
