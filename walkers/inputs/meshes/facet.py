@@ -40,7 +40,8 @@ class Facet(NamedTuple):
     point
         A point of it, m.
     direction
-        The normal of a face, toward the beads; the direction of an edge; zero of a corner.
+        A unit vector: of a face the normal toward the beads, of an edge its direction. Zero for a
+        corner.
     cells
         Groups of half-spaces. The facet has the nearest point of the surface for the beads that
         are in all half-spaces of one of the cells.
@@ -74,7 +75,8 @@ class Facet(NamedTuple):
         Returns
         -------
         ndarray, shape (...)
-            Distances in m; infinite where another facet of the surface is nearer.
+            Distances in m; infinite where another facet of the surface is nearer, and behind a
+            face.
         """
         within = np.zeros(places.shape[:-1], dtype=bool)
         for cell in self.cells:
@@ -88,20 +90,20 @@ class Facet(NamedTuple):
         return np.where(within, np.linalg.norm(self.offsets(places), axis=-1), inf)
 
     def normals(self, places: FloatArray) -> FloatArray:
-        """Unit vectors from the facet to places, of the shape of the places."""
+        """Unit vectors from the facet to places, shape (..., 3)."""
         offsets = self.offsets(places)
         return np.asarray(offsets / np.linalg.norm(offsets, axis=-1, keepdims=True))
 
     def nearest_points(self, places: FloatArray) -> FloatArray:
-        """Points of its plane, line or corner that are nearest to places, shape (..., 3), m."""
+        """The points of its plane, line or corner nearest to places, shape (..., 3), m."""
         return places - self.offsets(places)
 
     def deck_words(self) -> str:
-        """Nothing: the facet stands in the file of facets."""
+        """Empty: the deck does not name the facet, which stands in the file of facets."""
         return ""
 
     def file_rows(self) -> str:
-        """Its line of the file of facets, and one for each cell."""
+        """Its line in the file of facets, followed by a line for each of its cells."""
         place = f"{numbers_text(self.point)}  {numbers_text(self.direction)}"
         lines = [f"{self.kind} {place}  {len(self.cells)}\n"]
         for cell in self.cells:

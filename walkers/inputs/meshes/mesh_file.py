@@ -1,4 +1,4 @@
-"""Mesh files: which may be read, in which process, and what is said where it cannot be.
+"""Mesh files: which may be read, in which process, and what is said of those that cannot be read.
 
 The reading itself is in `walkers.inputs.meshes.mesh_reader`, which runs in a process of its own.
 What becomes of the triangles is in `walkers.inputs.meshes.mesh_surface`.
@@ -26,7 +26,17 @@ MOST_BYTES = 64 << 20
 _LONGEST_READING = 2.0 * mesh_reader.MOST_SECONDS
 """Time after which reading is ended, s: the machine may do other work, too."""
 _LONGEST_REASON = 300
-"""Largest length of a reader's message that is quoted, letters."""
+"""Largest number of letters of a reader's message that are quoted."""
+_VTK_PROBLEM = re.compile(r"(?:ERR|WARN)\| *(.+)")
+"""What VTK prints: ``(0.1s) [1A2B] vtkSTLReader.cxx:184 ERR| vtkSTLReader (0x55d0): …``."""
+_VTK_OBJECT = re.compile(r"^\w+ \(0x[0-9a-f]+\): *")
+"""The class and the address of an object of VTK, which precede its message."""
+_VTK_REPETITION = "returned failure for request"
+"""Part of a message of VTK that only says that an earlier one made the reading fail."""
+_MESHIO_PROBLEM = re.compile(r"^(?:Error|ReadError): *(.+)$", re.MULTILINE)
+"""What meshio prints: ``ReadError: …``."""
+_COLOUR_CODE = re.compile(r"\x1b\[[0-9;]*m")
+"""A code that changes the colour of the text in a terminal."""
 _FORMATS = "STL, OBJ, PLY, OFF, VTP, VTU, VTK, or another format of meshio"
 """Formats that can be read, for messages."""
 
@@ -62,7 +72,7 @@ def read_mesh(path: Path) -> dict[str, Any]:
 
 
 def _check_file(path: Path) -> None:
-    """Raise `ValueError` for what is not a file, or is too large."""
+    """Raise `ValueError` if there is no file at the path, or if it is too large."""
     try:
         status = path.stat()
     except OSError as error:
@@ -104,7 +114,7 @@ def _environment_of_reader() -> dict[str, str]:
 
 
 def _reason(reader: subprocess.CompletedProcess[bytes]) -> str:
-    """Why a process has not read its file."""
+    """Why a process has not read its file: its own words, those of a library, or its status."""
     reason = reader.stdout.decode("utf-8", "replace")
     if reader.returncode == mesh_reader.REFUSED:
         return reason
@@ -126,11 +136,12 @@ def _unreadable(reason: str) -> ValueError:
 
 
 def _printed_by_library(text: str) -> str:
-    """The first error or warning of VTK or meshio, without its place in their code."""
-    plain = re.sub(r"\x1b\[[0-9;]*m", "", text)
-    for line in re.findall(r"(?:ERR|WARN)\| *(.+)", plain):
-        if "returned failure for request" not in line:
-            return str(re.sub(r"^\w+ \(0x[0-9a-f]+\): *", "", line))
-    for line in re.findall(r"^(?:Error|ReadError): *(.+)$", plain, flags=re.MULTILINE):
-        return str(line)
-    return ""
+    """The first error or warning of VTK, or else of meshio; empty if there is none."""
+    plain = _COLOUR_CODE.sub("", text)
+    for message in _VTK_PROBLEM.findall(plain):
+        if _VTK_REPETITION not in message:
+            return _VTK_OBJECT.sub("", message)
+    meshio_problem = _MESHIO_PROBLEM.search(plain)
+    if meshio_problem is None:
+        return ""
+    return meshio_problem[1]
