@@ -23,7 +23,7 @@ from walkers.inputs.units import WRITTEN, is_auto, kind_in
 T = TypeVar("T")
 Completed = TypeVar("Completed", bound="ConfigTable")
 SAME_RUN = "same run"
-"""Annotation of a key: another value alone does not make another run."""
+"""Annotation of a key: cases that differ only in its value are the same run."""
 _TYPES: Mapping[Any, str] = {
     str: "text in quotes",
     int: "a whole number",
@@ -232,10 +232,17 @@ class ConfigTable(BaseModel):
                 yield place, value, field
 
     def determinants(self) -> dict[str, Any]:
-        """The values that make another run if they differ, by the names of their fields.
+        """The values in which two different runs differ, by the names of their fields.
 
-        Absent values are left out. A new key therefore renames no runs, while another name of a
-        field, or another default, renames all of them.
+        The name of a run has a hash of them. Derived fields count too; keys that are marked
+        `SAME_RUN` do not. Absent values (None, or an empty list) are left out: a new key therefore
+        leaves all names of runs as they are, while a new name of a field, or a new default, changes
+        them.
+
+        Returns
+        -------
+        dict
+            Values in SI units. Tables are dictionaries, and several tables lists of dictionaries.
         """
         determinants: dict[str, Any] = {}
         for name, field in type(self).model_fields.items():

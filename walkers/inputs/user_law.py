@@ -11,7 +11,7 @@ from walkers.arrays import FloatArray
 from walkers.physics.bridge import BridgeLaw, Curve, Forces, Surfaces, UnusableLawError, columns_at
 
 _FARTHEST = 10.0
-"""Largest rupture distance, in radii of the smaller bead."""
+"""Largest rupture distance, over the radius of the smaller bead."""
 
 
 def load_law(name: str, file: Path) -> BridgeLaw:
@@ -38,9 +38,11 @@ def load_law(name: str, file: Path) -> BridgeLaw:
 
 
 def _curve(law: BridgeLaw, surfaces: Surfaces) -> Curve:
-    """The curve that a law returns for two surfaces, with forces that are checked.
+    """The curve that a law returns for two surfaces.
 
-    Raises `UnusableLawError` if it is not a curve, or its bridge breaks beyond `_FARTHEST`.
+    `walkers.physics.bridge.columns_at` checks its forces whenever they are evaluated. Raises
+    `UnusableLawError` if the law does not return a curve, or if its bridge breaks at a gap above
+    `_FARTHEST` radii of the smaller bead.
     """
     curve = _called(law, surfaces)
     if not isinstance(curve, Curve):
@@ -52,7 +54,8 @@ def _curve(law: BridgeLaw, surfaces: Surfaces) -> Curve:
         raise UnusableLawError(f"{breaks}; expected at most {farthest:g} m")
 
     def forces(gaps: FloatArray) -> Forces:
-        return Forces(*_called(columns_at, curve, gaps).T)
+        columns = _called(columns_at, curve, gaps)  # one column for each field of `Forces`
+        return Forces(*columns.T)
 
     return Curve(forces, curve.rupture, curve.formation, curve.scale)
 

@@ -37,7 +37,7 @@ FRACTIONS: Mapping[bool, Mapping[str, float]] = {
     True: {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4},
     False: {"rayleigh": 0.4, "hertz": 0.2, "viscous": 0.4},
 }
-"""Largest share of each limit for ``"auto"``, with loose beads (True) and without.
+"""Largest share of each limit for ``"auto"``, with loose beads, of no walker (True), and without.
 
 At 0.4 of the viscous limit (2 µs for glycerol), the climber and the pile were converged. Walkers
 alone do not collide with each other: at 0.4 of the Rayleigh limit, velocities are within 0.25 % of
@@ -67,14 +67,21 @@ class TimeStepLimits:
     viscous: float
 
     def recommended(self, *, loose: bool) -> tuple[float, str]:
-        """Largest step within the shares of all limits, with loose beads or for walkers alone.
+        """Largest step within the shares (`FRACTIONS`) of all limits.
+
+        Parameters
+        ----------
+        loose
+            Whether there are loose beads, which belong to no walker. Without them the step is also
+            at most `LONGEST_WALKER_STEP`.
 
         Returns
         -------
         step : float
             In s.
         reason : str
-            What determines the step: the lowest share of a limit, or the longest step of walkers.
+            The bound that determines the step: ``0.4 of the viscous limit``, for example, or ``at
+            most 4 us for walkers``.
         """
         steps = []
         for name, share in FRACTIONS[loose].items():
@@ -82,7 +89,7 @@ class TimeStepLimits:
         if not loose:
             longest = LONGEST_WALKER_STEP
             steps.append((longest, f"at most {longest * 1e6:g} us for walkers"))
-        return min(steps)
+        return min(steps)  # steps, and reasons only if two steps are equal
 
     def exceeded_by(self, time_step: float) -> list[str]:
         """Names of the limits below ``time_step`` (s)."""

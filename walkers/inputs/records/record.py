@@ -49,7 +49,7 @@ FEWEST_ROWS = 16
 MOST_ROWS = 100_000
 """Largest number of rows of a record."""
 FEWEST_PERIODS = 3.0
-"""Shortest record that does not repeat, in periods of its strongest line."""
+"""Shortest record that does not repeat, in periods of its strongest spectral line."""
 AMPLITUDE_WINDOW_PERIODS = 8
 """Width of the window for the local amplitude, in periods of the strongest line."""
 STATIONARY = 0.1
@@ -156,9 +156,8 @@ class Record(ConfigTable):
 
         It is the largest length of the vector, at the rows and at three instants between
         neighbouring rows: with six rows a period, the rows alone miss the peak of a sine by up to
-        13 %. Displacement and
-        velocity are without their slow part, which is uncertain near both ends of a record: they
-        are not evaluated there.
+        13 %. Displacement and velocity are without their slow part. That part is uncertain near
+        both ends of a record, so displacement and velocity are not evaluated there.
 
         Parameters
         ----------
@@ -329,7 +328,7 @@ class Record(ConfigTable):
 
     @cached_property
     def amplitude_range(self) -> tuple[float, float]:
-        """Smallest and largest local amplitude, m/s²."""
+        """Smallest and largest `local_amplitude` of the strongest spectral line in time, m/s²."""
         return float(self._amplitudes.min()), float(self._amplitudes.max())
 
     def motion(self, time: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ from walkers.files import read_limited
 from walkers.inputs.units import ACCELERATION, TIME, QuantityKind, parse_quantity
 
 _MOST_BYTES = 64 << 20
-"""Largest size of a file."""
+"""Largest size of a file, bytes."""
 _EXAMPLE = '"time (ms), x (g), z (m/s^2)"'
 _EXPECTED_HEADER = (
     f"expected a header that names the time and accelerations along x, y or z, such as {_EXAMPLE}"
@@ -123,7 +123,10 @@ def read_record(path: Path) -> RecordContents:
 
 
 def _text_of(path: Path) -> str:
-    """The text of a file."""
+    """The text of a file in UTF-8.
+
+    Raises `ValueError` if it cannot be read, is larger than `_MOST_BYTES` or is not UTF-8.
+    """
     try:
         contents = read_limited(path, _MOST_BYTES)
     except OSError as error:
@@ -134,7 +137,7 @@ def _text_of(path: Path) -> str:
         line = contents.count(b"\n", 0, error.start) + 1
         byte = f"byte {contents[error.start]:#04x} in line {line}"
         raise ValueError(f"expected UTF-8 text, found {byte}: save the file as UTF-8") from error
-    if "\0" in text:
+    if "\0" in text:  # as in UTF-16
         raise ValueError("expected UTF-8 text, found zero bytes: save the file as UTF-8")
     return text
 

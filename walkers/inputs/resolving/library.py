@@ -205,7 +205,7 @@ class Library:
 
 
 def _properties_of_mixture(name: str, composition: Composition) -> dict[str, str]:
-    """Properties of a liquid that is a mixture, to four digits as a case writes them, else none."""
+    """Computed properties of a mixture, with four digits and unit; empty for other liquids."""
     if name not in MIXTURES:
         return {}
     texts = {}

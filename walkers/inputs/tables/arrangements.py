@@ -52,6 +52,7 @@ class Arrangement:
 
 def _chain(radii: Sequence[float], distance: TouchingDistance) -> Places:
     """One behind the other, the first in front."""
+    # The origin is the point over which the first two beads touch.
     x = distance(0, 1) * radii[0] / (radii[0] + radii[1])
     places = [(x, 0.0)]
     for bead in range(len(radii) - 1):

@@ -41,7 +41,7 @@ _HIGHEST_MULTIPLE = 9
 _DESCRIBED_HARMONICS = 3
 """Largest number of harmonics that the description of a drive names one by one."""
 _LINE_SHARE = 0.95
-"""The description of a record names its strongest line if the amplitude of the line is below this
+"""The description of a record has the amplitude of its strongest spectral line if it is below this
 share of the record's largest acceleration."""
 _TIME_TOLERANCE = 1e-9
 """Relative tolerance of equal times, and tolerance of whole numbers of cycles."""
@@ -545,16 +545,20 @@ class Excitation:
         return text
 
     def _described_record(self, record: Record) -> str:
-        """Frequency and largest acceleration of a record, and its line if it is clearly weaker."""
-        largest = record.largest(2)
-        line = record.amplitude_range[1]
-        text = f"record, {self.frequency:.4g} Hz, a0 = {largest:.4g} m/s²"
-        if line < _LINE_SHARE * largest:
-            text += f" (its line: {line:.4g} m/s²)"
+        """Frequency and largest acceleration of a record.
+
+        The amplitude of its strongest spectral line follows if it is below `_LINE_SHARE` of this
+        acceleration.
+        """
+        largest_acceleration = record.largest(2)
+        _, line_amplitude = record.amplitude_range  # in time; the line may come and go
+        text = f"record, {self.frequency:.4g} Hz, a0 = {largest_acceleration:.4g} m/s²"
+        if line_amplitude < _LINE_SHARE * largest_acceleration:
+            text += f" (its line: {line_amplitude:.4g} m/s²)"
         return text
 
     def _described_harmonics(self) -> str:
-        """All harmonics if they are few; else the largest one and the number of the others."""
+        """All harmonics if there are at most three, else the largest and the number of others."""
         if len(self.harmonics) <= _DESCRIBED_HARMONICS:
             return " + ".join(_described_harmonic(harmonic) for harmonic in self.harmonics)
         largest = _described_harmonic(self.largest)
