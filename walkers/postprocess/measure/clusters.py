@@ -45,7 +45,10 @@ gains 5e-5 m from one frame to the next.
 MAX_GAP = 0.1
 """Longest time, s, for which a cluster may touch the pile or lose the wall within a track."""
 MIN_OVERLAP = 0.5
-"""Smallest share of common beads (of the smaller cluster) in successive clusters of a track."""
+"""Smallest share of the beads of one cluster that are also in another one, if they are related.
+
+For successive clusters of a track, it is a share of the smaller one; for a cluster that splits from
+another or rejoins the pile, of its own beads."""
 NO_FLOOR = -1
 """Index of the floor of a vessel whose walls are all side walls."""
 EVENTS = ("freed", "split", "merged", "rejoined", "detached")
@@ -728,7 +731,11 @@ def _rejoined(track: Track, beads: PileBeads) -> bool:
 
 
 def _parent(tracks: Sequence[Track], number: int, time: FloatArray) -> int:
-    """The track that had most of the beads of a track shortly before it starts; -1 for none."""
+    """Index of the track from which the track ``number`` split; -1 if it split from none.
+
+    At most `MAX_GAP` before that track starts, the other one had at least `MIN_OVERLAP` of its
+    first beads. If several had, it is the one that had the most.
+    """
     first = tracks[number].frames[0]
     members = tracks[number].members[0]
     parent = -1

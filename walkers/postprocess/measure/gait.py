@@ -388,10 +388,14 @@ class _Growth(NamedTuple):
 
 
 def _growth_of_angles(group: Group) -> _Growth:
-    """The growth of the angles of walkers; none for runs with fewer than three measured cycles."""
+    """The growth of the angles of walkers to the axis.
+
+    The angles are those of one frame per cycle after settling, or of one in several cycles if
+    frames are that rare. With fewer than three such frames the numbers are NaN, and no angle grows.
+    """
     run = group.case.run
     angle = np.abs(group.orientation[:: run.samples_per_cycle][run.settled_strobes :])
-    if len(angle) < 3:  # too few frames a second, or a dump that was cut short
+    if len(angle) < 3:  # a short run, too few frames a second, or a dump that was cut short
         missing = np.full(len(group.walkers), np.nan)
         nothing_grows = np.zeros(len(group.walkers), dtype=bool)
         return _Growth(rate=missing, mean=missing, end=missing, grows=nothing_grows)

@@ -7,6 +7,7 @@ scatter is not an uncertainty of the velocity.
 
 `walkers.postprocess.measure.gait` computes the quantities of one kind of walkers. This module makes
 tables and numbers of them. Meetings of walkers and thresholds of motion have modules of their own.
+In the names of columns and numbers, the kind of a walker is called its ``make``.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ VERSION = 2
 _LONGER = 1.5
 """Recommended number of cycles over the number after which all turning walkers have turned."""
 _PREFIXES_OF_BEAD_COLUMNS = ("rotation_", "sliding_", "open_")
-"""Starts of the names of columns that belong to a bead or to a contact of the first kind."""
+"""Starts of the names of columns that belong to one bead or to one contact of a walker."""
 
 
 def applies(case: Case) -> bool:
@@ -132,7 +133,10 @@ def _means_of_beads(walkers: Columns, case: Case) -> dict[str, float]:
 
 
 def _numbers_of_kind(number: int, walkers: Columns, case: Case) -> dict[str, float]:
-    """Velocity and counts of one kind of walkers, which has this number, from 1."""
+    """Mean velocity (m/s) and counts of one kind of walkers, which has this number, from 1.
+
+    The mean is over the walkers that `same_heading` chooses; the counts are of all walkers.
+    """
     velocity = walkers["velocity"][same_heading(walkers, uphill=case.goes_uphill)]
     return {
         f"velocity_make_{number}": float(velocity.mean()),
@@ -144,11 +148,14 @@ def _numbers_of_kind(number: int, walkers: Columns, case: Case) -> dict[str, flo
 def _doubts(numbers: Mapping[str, Any], *, changes: bool) -> Iterator[str]:
     """Reasons to doubt the velocity.
 
-    Walkers on trays stop when they meet, and a drive whose strength ``changes`` changes their
-    velocity: neither is a reason to doubt.
+    Walkers on trays are meant to meet, and stop when they do; a drive whose strength ``changes``
+    changes their velocity. Neither is a reason to doubt. (On trays, ``came_apart`` and
+    ``depends_on_start`` are always false.)
     """
+    meant_to_meet = numbers["meets"]
     unsteady = numbers["walkers"] - numbers["steady"]
-    if unsteady and not (numbers["meets"] or numbers["came_apart"] or changes):
+    # Walkers that came apart have a warning of their own.
+    if unsteady and not (meant_to_meet or numbers["came_apart"] or changes):
         verb = "is" if unsteady == 1 else "are"
         yield (
             f"{unsteady} of {numbers['walkers']} walkers {verb} not steady: "
@@ -160,7 +167,7 @@ def _doubts(numbers: Mapping[str, Any], *, changes: bool) -> Iterator[str]:
     if numbers["depends_on_start"] and not changes:
         difference = f"steady copies differ by more than {percent(SAME)}"
         yield f"{difference}: the velocity depends on the start"
-    if numbers["walkers_met"] and not numbers["meets"]:
+    if numbers["walkers_met"] and not meant_to_meet:
         yield "walkers came close to each other and are not independent: increase the spacing"
 
 
@@ -256,13 +263,15 @@ def _trajectory_table(group: Group) -> Columns:
 def _walkers_table(group: Group, averages: gait.Averages) -> Columns:
     """Table ``walkers``: start and end of each walker, and means over the cycles after settling.
 
-    Values are in SI units. Contacts are those of the beads, then those between the beads.
+    Values are in SI units, angles in rad. ``separated_fraction`` is the share of the samples in
+    which a gap between two beads of the walker is above their rupture distance.
     """
     beads = len(group.radii)
+    pairs = slice(beads, None)  # of the contacts: those of beads with walls come first
     samples = gait.settled_samples(group.case.run)
-    loads_of_pairs = contact_loads(group.case, group.kind)[beads:]
+    loads_of_pairs = contact_loads(group.case, group.kind)[pairs]
     rupture_distance = np.array([load.rupture for load in loads_of_pairs])
-    separated = (group.gap[samples, :, beads:] > rupture_distance).any(axis=-1)
+    separated = (group.gap[samples, :, pairs] > rupture_distance).any(axis=-1)
     columns = {
         "walker": group.walker_numbers,
         "make": np.array([walker.kind for walker in group.walkers]),
@@ -363,7 +372,7 @@ def _contact_numbers(motion: Motion) -> dict[tuple[int, int], int]:
 
 
 def _mean(values: FloatArray) -> float:
-    """Mean of the finite values; NaN if there are none."""
+    """Mean of the finite values; NaN if no value is finite."""
     finite = values[np.isfinite(values)]
     if len(finite) == 0:
         return nan
@@ -426,7 +435,7 @@ def _work(groups: Sequence[Group], cycles: Columns, walkers: Columns) -> dict[st
 
     The cost is f W / (M g |v|), with the work W per cycle, the frequency f, the mass M and the
     velocity v along the heading. It is the power of the drive over the power of lifting the walker
-    as fast as it walks. Walkers that hardly walk have none.
+    as fast as it walks. It is NaN for walkers slower than `STEADY_SPEED`.
 
     Parameters
     ----------
