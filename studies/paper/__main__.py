@@ -30,16 +30,17 @@ def paper(  # noqa: PLR0913
     jobs: JobsOption = None,
     engine: EngineOption = None,
 ) -> int:
-    """Draw the paper's figures with our results, and write a table of its facts.
+    """Draw the paper's figures with our results, and compare the results with the paper's facts.
 
-    Missing runs are made first.
+    Missing runs are made first. The comparison is a table of facts that the paper states, with our
+    results beside them. The exit status is 1 if a run failed or a figure is left out.
 
     Parameters
     ----------
     to
         Folder to write the figures to.
     only
-        Draw only the figure with this name, or comparison. Repeatable.
+        Name of a figure, or the word comparison for the table: only this is made. Repeatable.
     """
     drawn = make_figures(
         out,
@@ -56,8 +57,8 @@ def paper(  # noqa: PLR0913
     for figure, reason in drawn.left_out.items():
         tell(f"{figure} is left out: {reason}")
     print_lines(drawn.files)
-    for parameters, (agree, number) in drawn.counts.items():
-        print(f"{agree} of {number} facts agree: {parameters}")
+    for parameter_set, (agree, number) in drawn.counts.items():
+        print(f"{agree} of {number} facts agree: {parameter_set}")
     return 1 if drawn.failures or drawn.left_out else 0
 
 
