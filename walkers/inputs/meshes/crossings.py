@@ -42,7 +42,7 @@ class Crossing(NamedTuple):
 
 
 def first_fold(vessel: Vessel) -> Crossing | None:
-    """Two neighbours that lie upon each other, if there are any."""
+    """The first two neighbours that are folded onto each other; None if there are none."""
     pairs = vessel.neighbours
     if not len(pairs):
         return None
@@ -69,21 +69,22 @@ def _slack(vessel: Vessel) -> float:
 
 
 def first_crossing(vessel: Vessel) -> Crossing | None:
-    """An edge and a triangle that intersect, or overlap in a plane, if there are any."""
+    """An edge and a triangle that intersect, or overlap in a plane; None if there are none."""
     slack = _slack(vessel)
     edges = np.array([sorted(edge) for edge in vessel.sides_at_edges], dtype=np.int64)
     # Small integers are compared faster.
     edge_ends = edges.T.astype(np.int32)
     triangle_corners = vessel.triangles.T.astype(np.int32)
     for edge_numbers, triangle_numbers in _near_pairs(vessel, edges):
-        apart = np.ones(len(edge_numbers), dtype=bool)
+        have_no_common_corner = np.ones(len(edge_numbers), dtype=bool)
         for end in edge_ends:
             end_points = end[edge_numbers]
             for corner in triangle_corners:
-                apart &= corner[triangle_numbers] != end_points
-        if apart.any():
-            near_edges = edges[edge_numbers[apart]]
-            crossing = _crossing_of(vessel, near_edges, triangle_numbers[apart], slack)
+                have_no_common_corner &= corner[triangle_numbers] != end_points
+        if have_no_common_corner.any():
+            near_edges = edges[edge_numbers[have_no_common_corner]]
+            near_triangles = triangle_numbers[have_no_common_corner]
+            crossing = _crossing_of(vessel, near_edges, near_triangles, slack)
             if crossing is not None:
                 return crossing
     return None
@@ -134,7 +135,22 @@ def _crossing_of(
 
 
 def _near_pairs(vessel: Vessel, edges: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
-    """Numbers of edges and triangles whose boxes overlap, in groups of edges near each other."""
+    """Pairs of an edge and a triangle whose bounding boxes overlap; no others can intersect.
+
+    To compare each edge with few triangles, edges are taken in groups along a Morton curve.
+
+    Parameters
+    ----------
+    vessel
+        The surface.
+    edges : ndarray, shape (n, 2)
+        Points of the edges.
+
+    Yields
+    ------
+    edge_numbers, triangle_numbers : ndarray, shape (pairs,)
+        The pairs of a group of edges, of which there may be none.
+    """
     corners = vessel.points[vessel.triangles]
     triangle_low = corners.min(axis=1)
     triangle_high = corners.max(axis=1)
@@ -204,8 +220,8 @@ def _overlap_in_plane(
 ) -> npt.NDArray[np.bool_]:
     """Whether lines in the planes of triangles have points within them, shape (n,).
 
-    They have if no direction across a side of the triangle, or across the line, separates them. The
-    arguments are those of `_goes_through`.
+    They have such points unless a direction across a side of the triangle, or across the line,
+    separates line and triangle. The arguments are those of `_goes_through`.
     """
     direction = line[:, 1] - line[:, 0]
     across = np.cross(normal, direction)

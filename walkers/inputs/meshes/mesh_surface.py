@@ -130,7 +130,7 @@ def _consistent(vessel: Vessel) -> Vessel:
 
 
 def _check_rims(vessel: Vessel) -> None:
-    """Refuse several openings."""
+    """Refuse several openings, also those that meet in a point."""
     starts: Counter[int] = Counter()
     for sides in vessel.sides_at_edges.values():
         if len(sides) == 1:

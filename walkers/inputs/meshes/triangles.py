@@ -73,6 +73,7 @@ def merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArra
     sides = points[triangles] - np.roll(points[triangles], -1, axis=1)
     longest = np.linalg.norm(sides, axis=2).max(axis=1)
     area_vectors = np.cross(sides[:, 0], sides[:, 1])
+    # Twice the area of a triangle over its longest side is its height.
     is_wide = np.linalg.norm(area_vectors, axis=1) > near * longest
     _, first_of_triangle = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     triangles = triangles[[number for number in sorted(first_of_triangle) if is_wide[number]]]

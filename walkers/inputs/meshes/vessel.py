@@ -49,7 +49,7 @@ _LEVEL = cos(1e-3)
 _UPRIGHT = 1e-3
 """Largest vertical component of the unit normal of an upright face."""
 _WITH_BORDER = -3e-308
-"""Bound of a half-space that contains its border."""
+"""Bound of a half-space that contains its border: an offset of zero is above this bound."""
 _OVERLAPPING = -1e-12
 """Bound of half-spaces of neighbouring triangles of a face, which overlap, m."""
 _NEAR = 0.3
@@ -451,8 +451,9 @@ class Vessel:
     def facets_near_bead(self, radius: float) -> float:
         """Mean number of facets near a bead of a radius (m) that touches the surface somewhere.
 
-        These are the facets that the engine looks at in each step: their boxes are nearer than
-        `_NEAR` radii. Beads stand at random on the faces; the seed is always the same.
+        These are the facets that the engine looks at in each step: their bounding boxes are nearer
+        to the surface of the bead than `_NEAR` radii. The beads are placed on the faces at random,
+        always with the same seed.
         """
         areas = np.linalg.norm(self._area_vectors, axis=1)
         draw = np.random.default_rng(0)
@@ -469,7 +470,7 @@ class Vessel:
 
     @cached_property
     def _boxes(self) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest corners of the boxes of the facets, shape (F, 3), m."""
+        """Lowest and highest corners of the bounding boxes of F facets, m, shape (F, 3) each."""
         low = []
         high = []
         for facet in self.facets:

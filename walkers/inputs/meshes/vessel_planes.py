@@ -15,6 +15,10 @@ from walkers.inputs.meshes.wall_names import axis_name
 
 _MOST_EXTENT = 1e3
 """Extent of a vessel over its height from which it counts as open to a side."""
+_AT_FAR_PLANE = 0.999
+"""Coordinate of a corner over the distance of the far planes above which it is on one of them."""
+_SMALLEST_SPHERE = 1e-9
+"""Radius of the largest sphere between planes below which they enclose nothing, m."""
 
 
 def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Vessel:
@@ -87,7 +91,7 @@ def _place_inside(normals: FloatArray, offsets: FloatArray) -> FloatArray:
     conditions = np.column_stack([-normals, np.ones(len(normals))])
     bounds = [(None, None), (None, None), (None, None), (0, None)]
     best = linprog([0, 0, 0, -1], conditions, -offsets, bounds=bounds)
-    if best.status or best.x[3] < 1e-9:
+    if best.status or best.x[3] < _SMALLEST_SPHERE:
         message = "enclose nothing; expected normals toward the beads, and a height above them"
         raise key_error("boundary.planes", message)
     return np.asarray(best.x[:3])
@@ -95,7 +99,7 @@ def _place_inside(normals: FloatArray, offsets: FloatArray) -> FloatArray:
 
 def _check_closed(corners: FloatArray, far: float) -> None:
     """Refuse planes of which some corners, shape (n, 3), are at the far planes (m)."""
-    if np.abs(corners).max() <= 0.999 * far:
+    if np.abs(corners).max() <= _AT_FAR_PLANE * far:
         return
     farthest = corners[np.abs(corners).max(axis=1).argmax()]
     problem = f"are open toward {axis_name(farthest)}"
