@@ -14,6 +14,9 @@ unless the record repeats.
 With p rows a period, the spline of a sine is off by (2π/p)⁴/384 of its peak: 4e-5 with 18 rows,
 2e-10 with 400.
 
+A *line* is a maximum of the spectrum of the acceleration: a frequency at which the boundary shakes.
+The *local amplitude* of a record is that of its strongest line around a time.
+
 Files are read in `walkers.inputs.records.record_file`. The numerics of sampled signals are in
 `walkers.inputs.records.signals`.
 """
@@ -56,6 +59,12 @@ STATIONARY = 0.1
 """Largest difference of local amplitudes of a stationary record, over the largest one."""
 _SLOW_WINDOW_PERIODS = 4
 """Width of the window for the slow part of the displacement, in periods of the slowest line."""
+_LARGEST_MARGIN = 0.4
+"""Largest share of a record at either end in which the slow part counts as uncertain."""
+_NODES_PER_WINDOW = 16
+"""Nodes of the spline of the slow part in each of its windows, within which it hardly changes."""
+_FEWEST_NODES = 4
+"""Smallest number of nodes of this spline."""
 _UNEVEN_STEP = 1.5
 """Longest time between two rows, in medians of all of them, unless single rows are lost."""
 _LOST_STEP = 2.5
@@ -134,7 +143,8 @@ class Record(ConfigTable):
         width = int(min(_SLOW_WINDOW_PERIODS / self._periods_of_lines[0], 1.0) * count)
         time = np.linspace(0.0, self.length, count)
         slow = slow_part(self.course(time), width)
-        nodes = np.unique(np.linspace(0, count - 1, 4 + 16 * count // width).astype(np.int64))
+        node_count = _FEWEST_NODES + _NODES_PER_WINDOW * count // width
+        nodes = np.unique(np.linspace(0, count - 1, node_count).astype(np.int64))
         return CubicSpline(time[nodes], slow[nodes])
 
     @property
@@ -167,7 +177,8 @@ class Record(ConfigTable):
         rows = np.arange(len(self.course.x))
         time = np.interp(np.arange(0.0, rows[-1] + 0.125, 0.25), rows, self.course.x)
         if order < 2 and not self.repeats:
-            margin = min(_SLOW_WINDOW_PERIODS / self._periods_of_lines[0], 0.4) * self.length
+            margin = min(_SLOW_WINDOW_PERIODS / self._periods_of_lines[0], _LARGEST_MARGIN)
+            margin *= self.length
             time = time[(time >= margin) & (time <= self.length - margin)]
         return float(np.linalg.norm(self.shaking(time, order), axis=1).max())
 
@@ -522,7 +533,7 @@ def _row_of(row: Sequence[Any]) -> tuple[float, float, float, float]:
 
 
 def _are_gaps(time: FloatArray) -> BoolArray:
-    """Whether a row is lost between any two, shape (N - 1,)."""
+    """Whether at least one row is lost between two successive ones, shape (N - 1,)."""
     steps = np.diff(time)
     return np.asarray(steps > _UNEVEN_STEP * np.median(steps))
 

@@ -1,8 +1,8 @@
 """Drive of the boundary: the table ``[drive]``, and the shaking that it stands for.
 
 A drive is a sum of sines A sin(2π f t + φ), or a record. The cycle of a sum is the common period of
-its sines; its peak acceleration, and Γ0, belong to the largest sine. Files of records are read in
-`walkers.inputs.records`.
+its sines; its peak acceleration, and the dimensionless Γ0 (`walkers.physics.dimer`), belong to the
+largest sine. Files of records are read in `walkers.inputs.records`.
 """
 
 from __future__ import annotations
@@ -374,7 +374,7 @@ class Excitation:
     def changes(self) -> bool:
         """Whether the strength of the drive changes.
 
-        It changes by a ramp, or because a record is not stationary.
+        It changes by a ramp, or with the amplitude of a record (`Record.is_stationary`).
         """
         return bool(self.ramp) or (self.record is not None and not self.record.is_stationary)
 
@@ -445,8 +445,9 @@ class Excitation:
         times, factors = np.array(self.ramp or ((0.0, 1.0),)).T
         cycle = 1.0 / self.frequency
         half = cycle / 2.0
-        # The factor is constant outside the ramp. The spline contains a part of it that is longer
-        # than the interval of the mean, so that the last piece of the result is constant, too.
+        # The factor is constant outside the ramp. The result ends a cycle before the ends of the
+        # spline. With more than one and a half cycles outside the ramp, its first and last pieces
+        # are constant, too.
         margin = max(_MARGIN, 1.6 * cycle)
         start = times[0] - margin
         end = times[-1] + margin
