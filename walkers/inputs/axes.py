@@ -158,7 +158,7 @@ def _are_ends_and_number(given: object) -> TypeGuard[list[Any]]:
 
 
 def _numbers(key: str, given: list[Value], *, positive: bool) -> tuple[list[float], str | None]:
-    """The numbers of a range and their unit."""
+    """The numbers of values without their unit, and this unit, which all must have."""
     unit = unit_of(key, given)
     numbers = [number_of(key, value) for value in given]
     if positive and min(numbers) <= 0:
@@ -356,7 +356,8 @@ def range_of(key: str, given: object) -> Range:
     NotARange
         If the value has another form.
     InputError
-        If the ends are not two numbers of one unit, the smaller one first.
+        If the numbers are not of one unit and in ascending order, or not above zero for
+        ``loguniform``.
     """
     if not isinstance(given, Mapping) or len(given) != 1:
         raise NotARange(key)

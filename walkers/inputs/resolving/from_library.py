@@ -114,7 +114,7 @@ def supplied(
 
 
 def _name_at(document: Mapping[str, Any], key: str) -> str | None:
-    """The name at a key of a case; None if there is none, or no text."""
+    """The name at a key of a case; None if the case has no text there."""
     name = value_at(document, parts_of(key))
     return name if isinstance(name, str) else None
 
@@ -149,8 +149,8 @@ def _composition(document: Mapping[str, Any], liquid: str | None) -> Composition
     Raises
     ------
     InputError
-        If the mass fraction is missing or none, if the temperature is none, or if another liquid
-        has one of them.
+        If the mass fraction is missing or is not a number from 0 to 1, if the temperature is not a
+        temperature, or if a liquid that is no mixture has either of them.
     """
     share = value_at(document, parts_of(_MASS_FRACTION))
     temperature = value_at(document, parts_of(_TEMPERATURE))

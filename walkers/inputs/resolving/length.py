@@ -1,7 +1,8 @@
 """The time step, the length and the sampling of a run, which follow from the whole case.
 
 What the keys of ``[run]`` mean is in `walkers.inputs.tables.run`, the limits of the time step in
-`walkers.physics.time_step`.
+`walkers.physics.time_step`. *Loose beads* belong to no walker: they are poured as a mixture, or
+placed one by one.
 """
 
 from __future__ import annotations

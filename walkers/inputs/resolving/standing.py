@@ -2,7 +2,8 @@
 
 How the beads of one walker stand beside each other is the subject of
 `walkers.inputs.tables.arrangements`; the deck chooses the places of walkers on the substrate
-(`walkers.templates.placement`).
+(`walkers.templates.placement`). *Loose beads* belong to no walker: they are poured as a mixture, or
+placed one by one.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ def _chain(radii: Sequence[float], distance: TouchingDistance) -> Places:
 
 def _fan(radii: Sequence[float], distance: TouchingDistance) -> Places:
     """The first bead in front, the others behind it: all touch the first, and each the next."""
-    angles = [0.0]  # of the beads behind, around the first one and from the second one
+    angles = [0.0]  # around the first bead: from the second bead to each of those behind, rad
     for bead in range(1, len(radii) - 1):
         side = distance(0, bead)
         next_side = distance(0, bead + 1)
@@ -74,7 +74,7 @@ def _fan(radii: Sequence[float], distance: TouchingDistance) -> Places:
         angles.append(angles[-1] + acos(cosine))
     opening = angles[-1]
     mean_step = opening / max(len(angles) - 1, 1)
-    if opening + mean_step > 2.0 * pi * (1.0 + 1e-9):
+    if opening + mean_step > 2.0 * pi * (1.0 + 1e-9):  # a full circle, with rounding errors, fits
         raise ValueError("too many beads to fit around the first one; expected fewer")
     front = distance(0, 1) * radii[0] / (radii[0] + radii[1])
     places = [(front, 0.0)]

@@ -66,6 +66,8 @@ Ranges = Annotated[dict[str, Any], BeforeValidator(_ranges_by_key)]
 
 The samplers of a sweep take them in this form.
 """
+_PARALLEL = 1.0 - 1e-9
+"""Cosine of the angle between two directions above which they are the same: within 0.003°."""
 _BODIES = ("dimers", "clusters", "mixture", "placed")
 """Keys of the tables of bodies, of which a case has at least one."""
 _AT_MOST_100 = Field(max_length=100)
@@ -198,7 +200,7 @@ class Setup(CaseFile):
 
     @property
     def loose(self) -> bool:
-        """Whether there are loose beads, which may form clusters."""
+        """Whether there are loose beads, of no walker: a mixture, or placed ones."""
         return self.mixture is not None or bool(self.placed)
 
     @cached_property
@@ -242,7 +244,8 @@ class Setup(CaseFile):
         if not self.meets or all_at_random:
             return 0
         number = sum(walkers.replicates for walkers in self.walkers)
-        x_of_walkers = [x for x, _ in self.boundary.geometry.grid(number, 1.0)]
+        any_spacing = 1.0  # m; the number of walkers in a row does not depend on it
+        x_of_walkers = [x for x, _ in self.boundary.geometry.grid(number, any_spacing)]
         row_length = x_of_walkers.count(x_of_walkers[0])
         has_several_rows = row_length < number
         if has_several_rows and row_length % 2 == 0:
@@ -269,7 +272,7 @@ class Setup(CaseFile):
         x, y, _ = self.drive_axis
         uphill_x = cos(self.boundary.uphill)
         uphill_y = sin(self.boundary.uphill)
-        return x * uphill_x + y * uphill_y > 1.0 - 1e-9
+        return x * uphill_x + y * uphill_y > _PARALLEL
 
     @property
     def gravity_vector(self) -> Vector:

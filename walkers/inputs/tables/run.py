@@ -164,7 +164,11 @@ class RunSettings(RunTable):
 
     @property
     def settled_strobes(self) -> int:
-        """Number of stroboscopic samples before velocities are measured, rounded up."""
+        """Number of strobes before velocities are measured, rounded up.
+
+        Strobes are samples at one phase of the drive: one per cycle, or one in
+        ``cycles_per_sample`` cycles if samples are that rare.
+        """
         return -(-self.settling_cycles // self.cycles_per_sample)
 
     @property

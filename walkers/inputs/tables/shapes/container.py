@@ -125,6 +125,6 @@ class Container(Shape):
         layers = ceil(count / len(layer.places))
         level = bodies_top + layers * 2.0 * LOOSE * largest
         if level > 2.0 * self.height:  # where the walls and the simulation box end
-            sufficient = ceil(level / 2.0 * 1e5) / 100.0
+            sufficient = ceil(level / 2.0 * 1e5) / 100.0  # mm, rounded up to two decimals
             expected = f"expected {sufficient:g} mm or more"
             raise key_error("boundary.height", f"too low for {count} beads; {expected}")

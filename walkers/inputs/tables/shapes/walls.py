@@ -156,6 +156,7 @@ class Round(NamedTuple):
 
     def normals(self, places: FloatArray) -> FloatArray:
         """Unit vectors toward the axis, of the shape of the places."""
+        # On the axis there is no direction: the vector is zero there.
         from_axis = np.maximum(self.radius - self.distances(places), 1e-300)
         normals: FloatArray = places * (-1.0, -1.0, 0.0) / from_axis[..., None]
         return normals
