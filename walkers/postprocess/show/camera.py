@@ -14,6 +14,10 @@ from walkers.arrays import FloatArray
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.motion import Motion
 
+CAMERA_DISTANCE = 10.0
+"""Distance of the camera from the middle of a view, over the height of the view.
+
+In a parallel projection it does not change sizes; all beads must be in front of the camera."""
 _ELEVATION = radians(60.0)
 """Elevation of the camera above an open floor."""
 _ELEVATION_OF_ONE = radians(35.0)
@@ -77,7 +81,7 @@ def camera_axes(motion: Motion) -> FloatArray:
         return plan_axes(motion, np.array([1.0, 0.0, 0.0]))
     drive_axis = np.array(case.drive_axis)
     forward = _uphill(motion) if boundary.tilt else drive_axis
-    is_driven_forward = not boundary.tilt or abs(forward @ drive_axis) > 0.5
+    is_driven_forward = not boundary.tilt or abs(forward @ drive_axis) > 0.5  # within 60°
     elevation = _ELEVATION
     if boundary.bare and is_driven_forward and len(motion.walkers) == 1:
         elevation = _ELEVATION_OF_ONE

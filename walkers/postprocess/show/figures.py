@@ -248,6 +248,7 @@ def line_styles(labels: Sequence[str]) -> list[Look]:
             "linewidth": 0.9,
             "marker": _MARKERS[number % len(_MARKERS)],
             "mfc": "none",
+            # A marker at every 12 % of the diagonal of the axes, shifted by 2 % from line to line.
             "markevery": (0.02 * (number % 6), 0.12),
         }
         looks.append(look)
@@ -633,6 +634,7 @@ def _draw_beads(axes: Axes, places: FloatArray, radii: Sequence[float], colour: 
 def _draw_edge(axes: Axes, case: Case) -> None:
     """Draw the edge of the floor of a container: where the distance to its side walls is zero."""
     boundary = case.boundary
+    # From side to side and a little beyond, in steps of a two-hundredth of the width.
     edge = np.linspace(-0.55, 0.55, 221) * boundary.inner_width
     grid = np.stack(np.meshgrid(edge, edge, boundary.inner_height / 2.0), axis=-1)
     places = grid[:, :, 0]

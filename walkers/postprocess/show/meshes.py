@@ -97,8 +97,8 @@ def beach_ball(cells: int, motion: Motion) -> tuple[FloatArray, IntArray, IntArr
         Points, which are also the normals.
     triangles : ndarray of int, shape (T, 3)
         Corners of the triangles.
-    pale : ndarray of int, shape (V,)
-        1 for the points of pale lunes, 0 for those of dark ones.
+    shade : ndarray of int, shape (V,)
+        0 for the points of dark lunes, 1 for those of pale ones, as in `Scene.colours`.
     """
     import pyvista as pv
 
@@ -121,5 +121,5 @@ def beach_ball(cells: int, motion: Motion) -> tuple[FloatArray, IntArray, IntArr
     ball = pv.merge(lunes, merge_points=False)
     points = np.asarray(ball.points)
     points = points / np.linalg.norm(points, axis=1, keepdims=True)
-    pale = np.repeat(np.arange(_LUNES) % 2, len(points) // _LUNES)
-    return points, ball.regular_faces, pale
+    shade = np.repeat(np.arange(_LUNES) % 2, len(points) // _LUNES)
+    return points, ball.regular_faces, shade

@@ -148,6 +148,7 @@ def at_front_walls(motion: Motion, contacts: IntArray, ends: Ends, toward: Float
     """
     is_at_wall = contacts[:, 2] >= 0
     nearer = (ends.second - ends.first) @ toward
+    # Side walls seen edge-on are about as far from the camera as the beads: they do not count.
     return np.asarray(is_at_wall & (nearer > 0.5 * motion.radius[contacts[:, 0]]))
 
 

@@ -22,7 +22,7 @@ from walkers.files import VTK_SCRATCH, scratch_folder
 from walkers.postprocess.measure import piles
 from walkers.postprocess.measure.clusters import connected
 from walkers.postprocess.measure.motion import Bridges, Motion, read_bridges, read_motion
-from walkers.postprocess.show.camera import camera_axes
+from walkers.postprocess.show.camera import CAMERA_DISTANCE, camera_axes
 from walkers.postprocess.show.meshes import mesh_of, walls_of
 from walkers.postprocess.show.necks import bridge_ends
 from walkers.postprocess.show.scene import Scene, gathered
@@ -44,6 +44,12 @@ _NECK = 0.45
 """Drawn radius of a bridge over the radius of the smallest bead."""
 _FASTEST = 99.0
 """Percentile of the speeds at which the scale of colours ends."""
+_FEW_BEADS = 100
+"""Beads that are fewer than this are drawn finely."""
+_FINE_BALL = 48
+"""Points around a ball that is drawn finely."""
+_COARSE_BALL = 24
+"""Points around another ball."""
 
 
 def write_vtk(
@@ -232,7 +238,7 @@ def _view(motion: Motion) -> dict[str, Any]:
     """Settings of the script: colours (by walker; without walkers by speed), sizes, camera (m)."""
     scene = Scene.around(motion, camera_axes(motion), _EXTENT_FACTOR)
     height = scene.height(_ASPECT)
-    camera, middle, up = scene.camera(10.0 * height)
+    camera, middle, up = scene.camera(CAMERA_DISTANCE * height)
     colour = "walker"
     largest = None
     if not motion.walkers:
@@ -242,7 +248,7 @@ def _view(motion: Motion) -> dict[str, Any]:
         "colour": colour,
         "largest": largest,
         "neck": _NECK * float(motion.radius.min()),
-        "rounds": 48 if len(motion.radius) < 100 else 24,
+        "rounds": _FINE_BALL if len(motion.radius) < _FEW_BEADS else _COARSE_BALL,
         "closed": motion.case.boundary.closed,
         "tilted": motion.case.boundary.tilted,
         "camera": (1e-3 * camera).tolist(),

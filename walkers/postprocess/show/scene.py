@@ -208,7 +208,7 @@ class Scene:
         low, high = _limits(position, motion.radius, axes)
         boundary = motion.case.boundary
         if boundary.closed:
-            is_from_above = axes[2, 2] > 0.5
+            is_from_above = axes[2, 2] > 0.5  # the camera is more than 30° above the floor
             half = 5e2 * boundary.inner_width * np.array([1.0, is_from_above])
             low[:2] = np.minimum(low[:2], -half)
             high[:2] = np.maximum(high[:2], half)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from walkers.arrays import FloatArray, IntArray
 from walkers.postprocess.measure.motion import interpolated_positions, visible_displacement
+from walkers.postprocess.show.camera import CAMERA_DISTANCE
 from walkers.postprocess.show.meshes import beach_ball, floor_lines, mesh_of, round_below, walls_of
 from walkers.postprocess.show.necks import (
     NECK_COLOUR,
@@ -45,10 +46,6 @@ _SUPERSAMPLING = 1.5
 """Pixels that are drawn over those of the picture, in each direction."""
 _FLOOR_EXTENT = 6.0
 """Extent of the floor over that of the picture."""
-_CAMERA_DISTANCE = 10.0
-"""Distance of the camera from the middle of the view, over the height of the view.
-
-In a parallel projection it does not change the sizes in the picture; all beads must be in front."""
 _NEAREST_SHOWN = 0.1
 """Smallest distance from the camera that is drawn, over the height of the view."""
 _FARTHEST_SHOWN = 40.0
@@ -122,7 +119,7 @@ class Window:
         height_mm = scene.height(width / height)
         extent_mm = max(height_mm, height_mm * width / height)
         self.pixels_per_mm = height / height_mm
-        self._camera_position, self._middle, up = scene.camera(_CAMERA_DISTANCE * height_mm)
+        self._camera_position, self._middle, up = scene.camera(CAMERA_DISTANCE * height_mm)
         self._plotter.camera_position = [self._camera_position, self._middle, up]
         self._plotter.camera.parallel_projection = True
         self._plotter.camera.parallel_scale = height_mm / 2.0
@@ -288,6 +285,7 @@ class Window:
         lines = pv.line_segments_from_points(
             floor_lines(low, high, round_below(extent / _LINES_PER_EXTENT))
         )
+        # Slightly lower, so that lines do not cut through beads that overlap with the floor.
         lines.translate([0.0, 0.0, -1e-3 * extent], inplace=True)
         return [self._add_lines(lines, _LINES)]
 

@@ -202,6 +202,7 @@ def camera_of(motion: Motion, path: FloatArray | None = None) -> list[float]:
 def _axes_of_camera(motion: Motion) -> FloatArray:
     """The axes of the picture that the camera sees at first (`axes_toward`)."""
     toward = camera_axes(motion)[2]
+    # Containers are seen obliquely, so that their depth is visible.
     if from_the_side(motion.case):
         toward = np.array([-0.25, -1.0, 0.2])
     elif motion.case.boundary.closed:
@@ -280,7 +281,7 @@ def _balls(motion: Motion, orientations: FloatArray, colours: FloatArray) -> lis
     import k3d
     from scipy.spatial.transform import Rotation
 
-    points, triangles, pale = beach_ball(_BALL_CELLS, motion)
+    points, triangles, shade = beach_ball(_BALL_CELLS, motion)
     unit = points.astype(np.float32)
     balls = []
     for bead, radius in enumerate(motion.radius * 1e3):
@@ -293,7 +294,7 @@ def _balls(motion: Motion, orientations: FloatArray, colours: FloatArray) -> lis
             triangles.astype(np.uint32),
             normals=unit,
             name=f"bead {bead}",
-            colors=colours[pale, bead].astype(np.uint32),
+            colors=colours[shade, bead].astype(np.uint32),
             flat_shading=False,
             roughness=0.6,
         )
