@@ -149,9 +149,10 @@ def _state_of(motion: Motion, bridges: Bridges) -> _State:
     between_walkers = (owners[:, 0] >= 0) & (owners[:, 0] != owners[:, 1])
     pairs = owners[between_walkers]
     labels = connected(len(motion.walkers), np.unique(pairs, axis=0))
-    floored = motion.case.boundary.walls[0].name == FLOOR
+    # The walls of a groove are no side walls: walkers stand on both.
+    has_floor = motion.case.boundary.walls[0].name == FLOOR
     beads, walls = bridges.at_walls
-    at_sides = motion.walker_of[beads[(walls > 0) & floored]]
+    at_sides = motion.walker_of[beads[(walls > 0) & has_floor]]
     held = np.isin(labels, labels[at_sides[at_sides >= 0]])
     joined = frozenset((first, second) for first, second in pairs.tolist())
     return _State(joined=joined, size=np.bincount(labels)[labels], held=held)

@@ -103,8 +103,11 @@ The modules are those of `walkers.postprocess.measure.results.MODULES`."""
 SHOWN: Mapping[str, frozenset[str]] = {
     name: frozenset(names) for name, names in _FILE["shown"].items()
 }
-"""Which numbers are shown (`walkers.postprocess.measure.numbers.rows`), and which leave out walkers
-that face down."""
+"""Names of numbers, with ``*``, by why they are shown or not.
+
+``walkers.postprocess.measure.numbers.rows`` never shows those of ``aside`` and ``hidden``, those of
+``not_of_a_ramp`` under a ramp, those of ``not_of_parts`` if walkers came apart, and those of
+``if_any`` if they are zero. On a slope, those of ``facing_up`` leave out walkers that face down."""
 LABELS: Mapping[str, Mapping[str, str]] = _FILE["labels"]
 """Labels of numbers of walkers that face up or down: on a ``level`` boundary, on a ``slope``, and
 of ``both`` directions."""
