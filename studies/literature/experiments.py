@@ -218,11 +218,12 @@ def thrown_bead(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
     sliding_time = speed / SLIDING_DECELERATION
     overlap = contact_loads(case)[0].overlap
     bead = bead_at_plane(BOTTOM, -overlap, LARGE_RADIUS, velocity=(speed, 0.0, 0.0), spin=AT_REST)
+    # A frame every ten steps, for one and a half times the time 2v/7μg during which it slides.
     steps = 10 * round(0.15 * sliding_time / case.run.time_step)
     frames = run_beads(bench, [(bead, case)], steps, 10)[:, 0]
     slip = frames[:, 3] - LARGE_RADIUS * frames[:, 7]
     time = 10.0 * case.run.time_step * np.arange(len(frames))
-    slides = slip > 0.05 * speed
+    slides = slip > 0.05 * speed  # without the frames around the change to rolling
     slope, initial_slip = np.polyfit(time[slides], slip[slides], 1)
     title = "thrown bead: speed of rolling over speed of the throw"
     yield Line(title, 5.0 / 7.0, frames[-1, 3] / speed, 1e-3)
@@ -412,8 +413,8 @@ def restitutions(
         "contact.youngs_modulus": f"{modulus} Pa",
     }
     case = _wet_case(GLASS_RADIUS, FILM, changes)
-    start = 1.001 * FILM
-    distance = 1.01 * bridge_at_rest(case, GLASS_RADIUS, inf).rupture
+    start = 1.001 * FILM  # just above the film
+    distance = 1.01 * bridge_at_rest(case, GLASS_RADIUS, inf).rupture  # where the bridge has broken
     beads = []
     for viscosity in VISCOSITIES.tolist():
         with_film = case.with_value_at("liquid.dynamic_viscosity", viscosity)
@@ -489,7 +490,8 @@ def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterato
     rough = oily.with_value_at("contact.friction.bead_wall", FRICTION)
     thin = case.with_value_at("liquid.dynamic_viscosity", 4.6e-3)
     load = contact_loads(case)[0]
-    ceiling = Flat((0.0, 0.0, 0.02), (0.0, 0.0, -1.0), "ceiling")
+    ceiling_height = 0.02  # m, out of reach of the beads on the plate
+    ceiling = Flat((0.0, 0.0, ceiling_height), (0.0, 0.0, -1.0), "ceiling")
     above = bead_at_plane(BOTTOM, -load.overlap, radius, spin=AT_REST)
     below = bead_at_plane(ceiling, -load.overlap, radius, spin=AT_REST)
     largest_density = load.pull / (bead_volume(radius) * case.pressing_gravity)
@@ -508,7 +510,7 @@ def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterato
     yield Line("bead on a wet incline, friction 0.2: Rω/v", 1.0, rolling_share[1], 1e-2)
     title = "bead below a wet incline, no friction: Rω/v"
     yield Line(title, torque_free, rolling_share[2], 1e-2)
-    gaps = 0.02 - radius - last[:, 2]
+    gaps = ceiling_height - radius - last[:, 2]
     for times, hangs, gap in ((0.9, 1.0, gaps[3]), (1.1, 0.0, gaps[4])):
         title = f"bead below a wet incline, {times} times the weight that its bridge holds: hangs"
         yield Line(title, hangs, float(gap < film), 0.0)

@@ -127,6 +127,7 @@ def fig1b(sources: Sources) -> Figure:
     frames = frames[frames < len(trajectory.time)]
     strip = _strip(trajectory, frames)
 
+    # In inches: the image, its title and the space between rows; once, heading and labels of x.
     aspect = 2.0 * strip.half_width / (strip.along[1] - strip.along[0])
     row_height = 0.97 * ONE_COLUMN * aspect + 0.22
     height = len(frames) * row_height + 0.75
