@@ -25,7 +25,7 @@ from walkers.inputs.resolving.standing import starting_groups
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
-from walkers.inputs.tables.shapes.shape import LOOSE
+from walkers.inputs.tables.shapes.shape import LOOSE_PITCH
 from walkers.inputs.tables.shapes.walls import FLOOR
 from walkers.postprocess.measure.motion import read_bridges
 from walkers.postprocess.show.meshes import walls_of
@@ -594,7 +594,7 @@ def test_beads_are_poured_above_others_up_to_twice_the_height(
     """From upon the placed bead, up to 16 mm, where less than a layer is left free."""
     (_, pile), _ = starting_groups(with_count(partly_filled, largest_count))
     heights = [bead.z for bead in pile.beads]
-    radius = LOOSE * 0.5e-3
+    radius = LOOSE_PITCH * 0.5e-3
     assert min(heights) == pytest.approx(2.5e-3 + radius)
     assert 16e-3 - 3.0 * radius < max(heights) < 16e-3 - radius
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from walkers.arrays import FloatArray, Vector
 from walkers.errors import key_error
-from walkers.inputs.tables.shapes.shape import LOOSE, Layer, Shape, damping_between
+from walkers.inputs.tables.shapes.shape import LOOSE_PITCH, Layer, Shape, damping_between
 
-NEAREST = (1.0 - 1e-9) * LOOSE
+NEAREST = (1.0 - 1e-9) * LOOSE_PITCH
 """Smallest distance of a place from the walls, in radii of the largest bead.
 
 The factor below one is for rounding errors of places next to a wall."""
@@ -91,7 +91,7 @@ class Container(Shape):
 
     def layer(self, largest: float) -> Layer:
         """A square lattice of places for beads up to a radius (m), without those close to walls."""
-        columns = int(self.width / (2.0 * LOOSE * largest))
+        columns = int(self.width / (2.0 * LOOSE_PITCH * largest))
         pitch = self.width / max(columns, 1)
         line = [(column + 0.5) * pitch - self.width / 2.0 for column in range(columns)]
         lattice = list(product(line, line))
@@ -108,7 +108,7 @@ class Container(Shape):
         layer = self.layer(largest)
         for number in count_from():
             # In this order: another one changes the last digit of heights, and piles are chaotic.
-            yield replace(layer, level=(number + 0.5) * 2.0 * LOOSE * largest)
+            yield replace(layer, level=(number + 0.5) * 2.0 * LOOSE_PITCH * largest)
 
     def check_pour(self, count: int, largest: float, bodies_top: float) -> None:
         """Raise `InputError` unless the beads fit (see `Shape.check_pour`)."""
@@ -123,7 +123,7 @@ class Container(Shape):
             expected = "expected a wider boundary"
             raise key_error("boundary.height", f"too low for {count} beads; {expected}")
         layers = ceil(count / len(layer.places))
-        level = bodies_top + layers * 2.0 * LOOSE * largest
+        level = bodies_top + layers * 2.0 * LOOSE_PITCH * largest
         if level > 2.0 * self.height:  # where the walls and the simulation box end
             sufficient = ceil(level / 2.0 * 1e5) / 100.0  # mm, rounded up to two decimals
             expected = f"expected {sufficient:g} mm or more"

@@ -18,7 +18,7 @@ from walkers.errors import key_error
 from walkers.inputs.tables.shapes.outline import faces_within
 from walkers.inputs.tables.shapes.walls import FLOOR, Flat, Wall
 
-LOOSE = 1.03
+LOOSE_PITCH = 1.03
 """Pitch of the places from which beads are poured, in diameters of the largest bead."""
 _TWO_SIDES = 2.02
 """Largest distance of two opposite walls that a bead touches at once, in radii of the bead."""
@@ -61,7 +61,7 @@ class Layer:
             The displacement, m.
         """
         if self.tight:
-            return (LOOSE * largest - radius) / 2.0
+            return (LOOSE_PITCH * largest - radius) / 2.0
         return self.pitch / 2.0 - radius
 
 

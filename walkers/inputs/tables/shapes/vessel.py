@@ -18,7 +18,7 @@ from walkers.inputs.meshes.vessel import Vessel
 from walkers.inputs.meshes.vessel_planes import vessel_between
 from walkers.inputs.meshes.wall_names import names_of_faces
 from walkers.inputs.tables.shapes.container import NEAREST, Container
-from walkers.inputs.tables.shapes.shape import LOOSE, Layer
+from walkers.inputs.tables.shapes.shape import LOOSE_PITCH, Layer
 from walkers.inputs.tables.shapes.walls import Flat, Wall
 
 GIVEN_BY = Choice(("mesh", "scale"), ("planes", "height"))
@@ -108,7 +108,7 @@ class VesselShape(Container):
 
         A layer with many places comes in several strips along x, which have the same level.
         """
-        pitch = 2.0 * LOOSE * largest
+        pitch = 2.0 * LOOSE_PITCH * largest
         columns = ceil(self.width / pitch)
         line = pitch * (np.arange(columns) - (columns - 1) / 2.0)
         rows_at_once = max(1, _PLACES_AT_ONCE // columns)
