@@ -65,7 +65,7 @@ def check_applies(*cases: Case) -> None:
     for case in cases:
         if len(case.walkers) != 1 or len(case.walkers[0].radii) != 2 or case.loose:
             raise NotApplicable("bodies", "expected dimers; the theory is for dimers only")
-        if not case.boundary.bare:
+        if not case.boundary.is_open_floor:
             raise NotApplicable("boundary.shape", "the theory is for planes")
         if case.drive.ramp or not case.excitation.is_plain or case.excitation.direction[2] != 0.0:
             text = "the theory is for a single harmonic along the plane, without a phase or a ramp"

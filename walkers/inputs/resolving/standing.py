@@ -210,7 +210,7 @@ def check_bodies(case: Case) -> None:
         shape = case.boundary.geometry
         shape.check_pour(mixture.count, max(mixture.radii), _top_of_others(case))
     may_overlap = bool(case.placed) or case.meets
-    if may_overlap or (case.walkers and not case.boundary.bare):
+    if may_overlap or (case.walkers and not case.boundary.is_open_floor):
         beads = _beads_at_start(case)
         _check_walls(case, beads)
         if may_overlap:

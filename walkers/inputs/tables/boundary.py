@@ -126,9 +126,9 @@ class Boundary(ConfigTable):
         return SHAPES[self.shape].closed
 
     @property
-    def bare(self) -> bool:
+    def is_open_floor(self) -> bool:
         """Whether the boundary is a floor without side walls."""
-        return SHAPES[self.shape].bare
+        return SHAPES[self.shape].is_open_floor
 
     @property
     def walls(self) -> tuple[Wall, ...]:

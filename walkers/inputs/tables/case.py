@@ -418,7 +418,7 @@ class Case(Setup):
 
         They may if no walker meets another and the boundary is the same everywhere.
         """
-        return self.apart and self.run.has_one_segment and self.boundary.bare
+        return self.apart and self.run.has_one_segment and self.boundary.is_open_floor
 
 
 def _origin_from_source(name: str, source: Source, value: Any, kind: QuantityKind | None) -> Origin:

@@ -98,7 +98,7 @@ def gait(group: Group) -> Gait:
     heading = group.heading
     bead_velocity = np.einsum("fwbx,fwx->fwb", group.velocity, heading)
     rotation = radii * np.einsum("fwbx,fwx->fwb", group.spin, np.cross(_Z, heading))
-    if group.case.boundary.bare:
+    if group.case.boundary.is_open_floor:
         rotation_at_wall = rotation
     else:
         axis = np.cross(_nearest_normals(group), heading[:, :, None])

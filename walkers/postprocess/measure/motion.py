@@ -333,7 +333,7 @@ class Group:
     def _wall_distance(self) -> FloatArray:
         """Distance of the centre of each bead from its nearest wall, m, shape (F, W, n)."""
         boundary = self.case.boundary
-        if boundary.bare:  # an open floor at z = 0
+        if boundary.is_open_floor:  # at z = 0
             height: FloatArray = self.position[..., 2]
             return height
         first_wall, *other_walls = boundary.walls

@@ -83,7 +83,7 @@ def camera_axes(motion: Motion) -> FloatArray:
     forward = _uphill(motion) if boundary.tilt else drive_axis
     is_driven_forward = not boundary.tilt or abs(forward @ drive_axis) > 0.5  # within 60°
     elevation = _ELEVATION
-    if boundary.bare and is_driven_forward and len(motion.walkers) == 1:
+    if boundary.is_open_floor and is_driven_forward and len(motion.walkers) == 1:
         elevation = _ELEVATION_OF_ONE
     left = np.cross([0.0, 0.0, 1.0], forward)
     toward = np.array([0.0, 0.0, sin(elevation)]) - cos(elevation) * left

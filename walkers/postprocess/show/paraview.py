@@ -85,7 +85,7 @@ def write_vtk(
     destination = destination or directory / "vtk"
     earlier_files = _earlier_files(destination)
     motion = read_motion(directory)
-    if motion.case.boundary.bare:
+    if motion.case.boundary.is_open_floor:
         motion = gathered(motion)
     place = destination.absolute()
     place.parent.mkdir(parents=True, exist_ok=True)

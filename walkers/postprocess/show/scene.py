@@ -89,7 +89,7 @@ def gathered(motion: Motion, lane: float = 2.0) -> Motion:
     for number, walker in enumerate(motion.walkers):
         shift[list(walker.beads)] = -number * distance * across - [*walker.origin, 0.0]
     on_lanes = replace(motion, position=motion.position + shift)
-    if case.boundary.bare:
+    if case.boundary.is_open_floor:
         return on_lanes
     return on_lanes.of_walkers(on_lanes.walkers[:1])
 

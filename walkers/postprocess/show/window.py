@@ -104,7 +104,7 @@ class Window:
         import pyvista as pv
 
         width, height = size
-        is_open_floor = scene.motion.case.boundary.bare
+        is_open_floor = scene.motion.case.boundary.is_open_floor
         self._scene = scene
         self._size = (width, height)
         finer_size = [round(_SUPERSAMPLING * width), round(_SUPERSAMPLING * height)]

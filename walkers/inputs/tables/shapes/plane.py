@@ -15,7 +15,7 @@ class PlaneShape(Shape):
     """A floor without side walls; at a tilt of 90° it is a wall."""
 
     name: ClassVar[str] = "plane"
-    bare: ClassVar[bool] = True
+    is_open_floor: ClassVar[bool] = True
 
     @property
     def walls(self) -> tuple[Wall, ...]:

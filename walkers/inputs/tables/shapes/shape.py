@@ -79,8 +79,8 @@ class Shape(ABC):
     """Keys that a case file must give for this shape; the other sizes are refused."""
     closed: ClassVar[bool] = False
     """Whether it is a container, into which beads can be poured."""
-    bare: ClassVar[bool] = False
-    """Whether it is a floor without side walls."""
+    is_open_floor: ClassVar[bool] = False
+    """Whether it is a floor at z = 0 without side walls."""
     in_a_row: ClassVar[bool] = False
     """Whether walkers stand in a single row along x."""
 

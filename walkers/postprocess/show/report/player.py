@@ -402,7 +402,7 @@ def _all_contacts(bridges: list[IntArray]) -> tuple[IntArray, BoolArray]:
 
 
 def _walls(motion: Motion, step: float) -> list[Any]:
-    """The boundary, with transparent side walls, and lines on a bare floor.
+    """The boundary, with transparent side walls, and lines on an open floor.
 
     Parameters
     ----------
@@ -424,7 +424,7 @@ def _walls(motion: Motion, step: float) -> list[Any]:
         parts.append(_wall("floor", level, 1.0, _BELOW))
     if upright:
         parts.append(_wall("wall", upright, _WALL_OPACITY, 0.0))
-    if motion.case.boundary.bare:
+    if motion.case.boundary.is_open_floor:
         parts.append(_floor_lines(level[0], step))
     return parts
 
