@@ -47,6 +47,24 @@ It covers the step at which a contact begins to slip, and the overlap, which sho
 of friction.
 """
 
+_RESTITUTION = 5e-3
+"""Tolerance of the coefficient of restitution."""
+
+_X = 0
+"""Column of the place along x in frames of the second engine."""
+
+_Z = 2
+"""Column of the height."""
+
+_VX = 3
+"""Column of the velocity along x."""
+
+_VZ = 5
+"""Column of the upward velocity."""
+
+_SPIN_Y = 7
+"""Column of the angular velocity about y, which is positive for spheres that roll along x."""
+
 _STEPS_PER_CONTACT = 1000
 """Time steps in the shortest contact of a benchmark."""
 
@@ -161,17 +179,17 @@ class Benchmark:
         count = len(self.before.normal)
         radius = self.sphere.radius
         start = np.zeros((count, 9))
-        start[:, 0] = _SPACING * radius * np.arange(count)
-        start[:, 2] = radius
-        start[:, 3] = self.before.tangential
-        start[:, 5] = -self.before.normal
-        start[:, 7] = self.before.rolling / radius
+        start[:, _X] = _SPACING * radius * np.arange(count)
+        start[:, _Z] = radius
+        start[:, _VX] = self.before.tangential
+        start[:, _VZ] = -self.before.normal
+        start[:, _SPIN_Y] = self.before.rolling / radius
         if not self.pair:
             return start
-        start[:, 2] += _HEIGHT_OF_PAIRS * radius
+        start[:, _Z] += _HEIGHT_OF_PAIRS * radius
         hit = start.copy()
-        hit[:, 2] -= 2.0 * radius
-        hit[:, [3, 5, 7]] *= -1.0
+        hit[:, _Z] -= 2.0 * radius
+        hit[:, [_VX, _VZ, _SPIN_Y]] *= -1.0
         return np.concatenate([start, hit])
 
     def _case(self) -> Case:
@@ -183,7 +201,7 @@ class Benchmark:
             .with_value_at("beads.density", self.sphere.density)
             .with_value_at("run.time_step", self.step)
         )
-        roughness = 0.01 * self.sphere.radius
+        roughness = 0.01 * self.sphere.radius  # required, but only liquid feels it
         contact = case.contact.with_values(
             friction=Friction(bead_bead=self.friction, bead_wall=self.friction),
             restitution=self.restitution,
@@ -197,26 +215,27 @@ class Benchmark:
     def after(self) -> Speeds:
         """Speeds after the impact by the second engine."""
         frame = self.frames[-1]
-        return Speeds(frame[:, 5], frame[:, 3], self.sphere.radius * frame[:, 7])
+        return Speeds(frame[:, _VZ], frame[:, _VX], self.sphere.radius * frame[:, _SPIN_Y])
 
     def after_gross_sliding(self) -> Speeds:
         """Speeds after an impact on the plane in which the surfaces slide all the time."""
         normal, tangential, rolling = self.before
         direction = np.sign(self.before.sliding)
+        # Over the mass. It changes Rω by mR²/I = 5/2 times as much for a solid sphere.
         impulse = self.friction * (1.0 + self.restitution) * normal * direction
         return Speeds(self.restitution * normal, tangential - impulse, rolling + 2.5 * impulse)
 
     def force_against_time(self) -> tuple[FloatArray, FloatArray]:
         """Time since the first touch (s) and force (N) of a single sphere, shape (frames,) each."""
         mass = 2.0 * self.impact.mass if self.pair else self.impact.mass
-        force: FloatArray = mass * np.gradient(self.frames[:, 0, 5], self.step)
+        force: FloatArray = mass * np.gradient(self.frames[:, 0, _VZ], self.step)
         time: FloatArray = self.step * np.arange(1.0, len(self.frames) + 1.0)
         return time, force
 
     def duration(self) -> float:
         """Time from the first touch to the separation of a single sphere, s."""
-        height = self.frames[:, 0, 2]
-        depth = height[0] - height - self.frames[0, 0, 5] * self.step
+        height = self.frames[:, 0, _Z]
+        depth = height[0] - height - self.frames[0, 0, _VZ] * self.step
         last = int(np.flatnonzero(depth > 0.0)[-1])
         share_of_step = float(depth[last] / (depth[last] - depth[last + 1]))
         return self.step * (last + 1 + share_of_step)
@@ -430,7 +449,7 @@ def benchmarks() -> Iterator[Line]:
 def _compare_with_closed_forms(name: str, test: Benchmark) -> Iterator[Line]:
     """Restitution, Hertz's force and duration of elastic impacts, and no sliding in pairs."""
     difference = test.after.normal / test.before.normal - test.restitution
-    yield largest_difference(f"{name}, restitution", difference, 5e-3)
+    yield largest_difference(f"{name}, restitution", difference, _RESTITUTION)
     if len(test.before.normal) == 1 and test.restitution == 1.0:
         yield from _compare_with_hertz(name, test)
     if test.pair:

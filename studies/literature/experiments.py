@@ -88,6 +88,18 @@ VISCOSITIES = np.array([0.25, 0.5, 1.0, 2.0, 4.0]) * 4.6e-3
 SPEEDS = np.array([0.25, 0.5, 1.0, 2.0])
 """Speeds of the impacts, m/s."""
 
+_Z = 2
+"""Column of the height in the frames of `run_beads`."""
+
+_VX = 3
+"""Column of the velocity along x."""
+
+_VZ = 5
+"""Column of the upward velocity."""
+
+_SPIN_Y = 7
+"""Column of the angular velocity about y, which is positive for beads that roll along x."""
+
 _SPACING = 8e-3
 """Distance between beads that are simulated at the same time, m."""
 
@@ -221,12 +233,12 @@ def thrown_bead(bench: Bench, speed: float = 0.05) -> Iterator[Line]:
     # A frame every ten steps, for one and a half times the time 2v/7μg during which it slides.
     steps = 10 * round(0.15 * sliding_time / case.run.time_step)
     frames = run_beads(bench, [(bead, case)], steps, 10)[:, 0]
-    slip = frames[:, 3] - LARGE_RADIUS * frames[:, 7]
+    slip = frames[:, _VX] - LARGE_RADIUS * frames[:, _SPIN_Y]
     time = 10.0 * case.run.time_step * np.arange(len(frames))
     slides = slip > 0.05 * speed  # without the frames around the change to rolling
     slope, initial_slip = np.polyfit(time[slides], slip[slides], 1)
     title = "thrown bead: speed of rolling over speed of the throw"
-    yield Line(title, 5.0 / 7.0, frames[-1, 3] / speed, 1e-3)
+    yield Line(title, 5.0 / 7.0, frames[-1, _VX] / speed, 1e-3)
     expected = 2.0 * speed / (7.0 * FRICTION * G)
     yield Line("thrown bead: time until it rolls", expected, -initial_slip / slope, 1e-3, "s")
 
@@ -323,9 +335,10 @@ def measured_drift(bench: Bench, phase: float) -> FloatArray:
         )
         beads.append((bead, undriven.with_value_at("drive.harmonics", _tones(peak, phase))))
     steps_per_cycle = round(1.0 / BASE_FREQUENCY / undriven.run.time_step)
-    frames = run_beads(bench, beads, CYCLES * steps_per_cycle, 50)
-    measured = frames[1 + UNMEASURED_CYCLES * steps_per_cycle // 50 :]
-    sliding = measured[..., 3] - LARGE_RADIUS * measured[..., 7]
+    steps_per_frame = 50
+    frames = run_beads(bench, beads, CYCLES * steps_per_cycle, steps_per_frame)
+    measured = frames[1 + UNMEASURED_CYCLES * steps_per_cycle // steps_per_frame :]
+    sliding = measured[..., _VX] - LARGE_RADIUS * measured[..., _SPIN_Y]
     return np.asarray(sliding.mean(axis=0) / speeds)
 
 
@@ -423,9 +436,11 @@ def restitutions(
                 BOTTOM, start, GLASS_RADIUS, velocity=(0.0, 0.0, -speed), spin=AT_REST
             )
             beads.append((bead, with_film))
+    # The slowest bead has time to arrive, and to rise to the distance at a fifth of its speed.
     duration = (start + 5.0 * distance) / SPEEDS.min() + 2.0 * impact.duration(SPEEDS.min())
-    steps_per_frame = round(duration / case.run.time_step / 200)
-    frames = run_beads(bench, beads, 200 * steps_per_frame, steps_per_frame)
+    frame_count = 200
+    steps_per_frame = round(duration / case.run.time_step / frame_count)
+    frames = run_beads(bench, beads, frame_count * steps_per_frame, steps_per_frame)
     stokes = GLASS_DENSITY * 2.0 * GLASS_RADIUS * SPEEDS / (9.0 * VISCOSITIES[:, None])
     speeds_after = _speeds_of_departure(frames, GLASS_RADIUS + distance)
     return stokes, speeds_after.reshape(stokes.shape) / SPEEDS
@@ -436,9 +451,9 @@ def _speeds_of_departure(frames: FloatArray, height: float) -> FloatArray:
 
     ``frames`` is as from `run_beads`, shape (frames, N, 9); the speeds have the shape (N,).
     """
-    has_left = (frames[..., 2] > height) & (frames[..., 5] > 0.0)
+    has_left = (frames[..., _Z] > height) & (frames[..., _VZ] > 0.0)
     first = has_left.argmax(axis=0)
-    speeds = frames[first, range(frames.shape[1]), 5]
+    speeds = frames[first, range(frames.shape[1]), _VZ]
     return np.where(has_left.any(axis=0), speeds, 0.0)
 
 
@@ -498,9 +513,10 @@ def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterato
     light = replace(below, density=0.9 * largest_density)
     heavy = replace(below, density=1.1 * largest_density)
     beads = [(above, oily), (above, rough), (below, oily), (light, thin), (heavy, thin)]
-    last = run_beads(bench, beads, 300_000, 3000, (BOTTOM, ceiling))[-1]
+    steps = 300_000  # 60 ms, long enough to roll steadily or to fall
+    last = run_beads(bench, beads, steps, 3000, (BOTTOM, ceiling))[-1]
 
-    rolling_share = np.abs(radius * last[:, 7] / last[:, 3])
+    rolling_share = np.abs(radius * last[:, _SPIN_Y] / last[:, _VX])
     sliding, coupling, rolling = resistances_at_rest(oily, radius, inf)
     torque_free = (radius * sliding + coupling) / (
         radius * sliding + 2.0 * coupling + rolling / radius
@@ -510,7 +526,7 @@ def incline(bench: Bench, radius: float = 1e-3, film: float = 7.5e-5) -> Iterato
     yield Line("bead on a wet incline, friction 0.2: Rω/v", 1.0, rolling_share[1], 1e-2)
     title = "bead below a wet incline, no friction: Rω/v"
     yield Line(title, torque_free, rolling_share[2], 1e-2)
-    gaps = ceiling_height - radius - last[:, 2]
+    gaps = ceiling_height - radius - last[:, _Z]
     for times, hangs, gap in ((0.9, 1.0, gaps[3]), (1.1, 0.0, gaps[4])):
         title = f"bead below a wet incline, {times} times the weight that its bridge holds: hangs"
         yield Line(title, hangs, float(gap < film), 0.0)
