@@ -339,7 +339,7 @@ def _base_file(case: str, source: str, folder: Path) -> Path:
 
 
 def _file_beside(case: str, folder: Path) -> Path | None:
-    """The case file of this name in a folder; None if there is none."""
+    """The case file of this name in a folder; None if the folder has none."""
     if not case:
         return None
     names = [case]

@@ -153,7 +153,7 @@ def parse_quantity(text: str, kind: QuantityKind) -> float:
     Raises
     ------
     ValueError
-        If the text is no quantity, or one of another kind, or beyond the bounds of the kind.
+        If the text is not a quantity of this kind, or is beyond the bounds of the kind.
     """
     match = _NUMBER_AND_UNIT.fullmatch(text.strip())
     if match is None:

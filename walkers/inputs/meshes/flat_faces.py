@@ -66,7 +66,7 @@ class FlatFaces:
             self.neighbours_of[second].append(first)
 
     def grown(self) -> tuple[IntArray, dict[int, FittedPlane]]:
-        """Let faces grow, from the largest triangles on. Call it once.
+        """Let faces grow from triangles, the largest ones first. Call it once.
 
         Returns
         -------

@@ -2,9 +2,9 @@
 
 Libraries that read meshes end the process, or ask for all memory, where a file is damaged or made
 to do harm. So `walkers.inputs.meshes.mesh_file` starts this module with limits of time and
-memory. The module writes the points and triangles to standard output as an npz file, or the
-reason why there are none as text, with exit status `REFUSED` or `READ_NOTHING`. Of this project
-it imports the types of arrays alone, so that it starts quickly.
+memory. The module writes the points and triangles to standard output as an npz file. If there are
+none, it writes the reason as text, and its exit status is `REFUSED` or `READ_NOTHING`. From this
+project it only imports the types of arrays, so that it starts quickly.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def _check_precision(path: Path, points: FloatArray) -> None:
 
     VTK reads text into single precision, 7 digits. Files of single precision have no more to lose.
     """
-    start = path.read_bytes()[:2000]
+    start = path.read_bytes()[:2000]  # contains the header
     if path.suffix.lower() not in (".obj", ".ply", ".stl") or not len(points):
         return
     if b"\0" in start and b"property double" not in start:
@@ -215,7 +215,8 @@ def _read_by_vtk(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
     if dataset.IsA("vtkUnstructuredGrid"):
         points = _points_of(dataset)
         return points, _triangles_of_polygons(points, _polygons_of_grid(dataset))
-    raise NothingRead(f"it has a {dataset.GetClassName()[3:]}, which is no surface")
+    kind = dataset.GetClassName()[len("vtk") :]
+    raise NothingRead(f"it has a {kind}, which is no surface")
 
 
 def _lines_of_off(path: Path) -> list[list[str]]:

@@ -298,7 +298,7 @@ def _without_skin(vessel: Vessel) -> Vessel:
     """The vessel in a solid whose surface is closed, as CAD programs export it.
 
     A solid vessel has a deep hollow that is open to the top: its inner skin, up to the rim, is
-    the vessel. A closed room has none, and is the vessel as it is.
+    the vessel. A closed room has no such hollow: its whole surface is the vessel.
     """
     solid = _outward(_restricted(vessel, vessel.triangles[vessel.outer]))
     height = float(np.ptp(solid.points[:, 2]))

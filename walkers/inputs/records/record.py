@@ -175,7 +175,8 @@ class Record(ConfigTable):
             0 for the displacement, m, 1 for the velocity, m/s, or 2 for the acceleration, m/s².
         """
         rows = np.arange(len(self.course.x))
-        time = np.interp(np.arange(0.0, rows[-1] + 0.125, 0.25), rows, self.course.x)
+        quarters = np.arange(0.0, rows[-1] + 0.125, 0.25)  # of a row, to the last row
+        time = np.interp(quarters, rows, self.course.x)
         if order < 2 and not self.repeats:
             margin = min(_SLOW_WINDOW_PERIODS / self._periods_of_lines[0], _LARGEST_MARGIN)
             margin *= self.length
@@ -190,8 +191,8 @@ class Record(ConfigTable):
         time : ndarray, shape (N,)
             Times since the first row, s.
         order
-            0 for the displacement, 1 for the velocity, or 2 for the acceleration, of which the slow
-            part is not taken away.
+            0 for the displacement, 1 for the velocity, or 2 for the acceleration, whose slow part
+            is not subtracted.
 
         Returns
         -------
@@ -251,7 +252,8 @@ class Record(ConfigTable):
     def _periods_of_lines(self) -> list[int]:
         """Number of periods of each line in the record, increasing.
 
-        Lines are maxima of the spectrum, from two periods on, that are not faint.
+        Lines are maxima of the spectrum at two periods or more that are not faint (`_FAINT_SHARE`).
+        If there are none, the only line is the strongest component.
         """
         spectrum = self._spectrum
         strong = _FAINT_SHARE * spectrum[1:].max()
@@ -434,7 +436,7 @@ def course_text(times: FloatArray, powers: FloatArray, repeats: bool = False) ->
     powers : ndarray, shape (K, N)
         Coefficients of each piece, that of the highest power first, K up to 6.
     repeats
-        Whether the course repeats from its end on.
+        Whether the course repeats after its end.
 
     Returns
     -------

@@ -294,7 +294,7 @@ def _row_of(fields: Sequence[str], number: int, columns: Sequence[_Column]) -> l
 
 
 def _number_of(text: str) -> float:
-    """The number of a text, which may have a decimal comma; NaN if it is none."""
+    """The number of a text, which may have a decimal comma; NaN if it is not a number."""
     if text.count(",") == 1 and "." not in text:
         text = text.replace(",", ".")
     if _NUMBER.fullmatch(text) is None:

@@ -4,7 +4,7 @@ The functions take evenly spaced samples, one signal a column. They know nothing
 their files.
 
 A Hann window weights with sin²(πt/T) over its width T. It suppresses a sine of n periods in the
-window by 1/(π n (n² - 1)) at worst, and entirely if n is a whole number from two on. A plain mean
+window by 1/(π n (n² - 1)) at worst, and entirely if n is a whole number above one. A plain mean
 only suppresses it by 1/(π n).
 """
 
@@ -34,7 +34,7 @@ def leakage(periods: FloatArray) -> FloatArray:
     Parameters
     ----------
     periods : ndarray
-        Number of periods of the sine over which the mean is taken, from two on.
+        Number of periods of the sine over which the mean is taken, at least two.
 
     Returns
     -------

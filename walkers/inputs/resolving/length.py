@@ -20,6 +20,8 @@ from walkers.inputs.tables.run import CONSTANT, RunSettings, RunTable, settling_
 from walkers.physics.time_step import BridgedBead, TimeStepLimits, fit_into_cycle, time_step_limits
 from walkers.rounding import percent
 
+_ROUNDING = 1e-9
+"""Rounding error of a number of cycles, and relative one of a duration."""
 MOST_STEPS = 2**31 - 1
 """Largest number of time steps of a run: the engine counts them with 32 bits."""
 _SEGMENT_SECONDS = 0.5
@@ -177,11 +179,12 @@ def cycles_of(table: RunTable, drive: Excitation, cycles_per_sample: int) -> int
     fewest, most = drive.cycle_limits
     cycles_of_record = 0
     if drive.ends:
-        cycles_of_record = floor((most + 1e-9) / cycles_per_sample) * cycles_per_sample
+        cycles_of_record = floor((most + _ROUNDING) / cycles_per_sample) * cycles_per_sample
     if table.duration is not None:
+        # A duration of whole samples must not give one more because of a rounding error.
         samples = ceil(table.duration * drive.frequency * (1.0 - 1e-12) / cycles_per_sample)
         cycles = samples * cycles_per_sample
-        if drive.ends and table.duration <= drive.length * (1.0 + 1e-9):
+        if drive.ends and table.duration <= drive.length * (1.0 + _ROUNDING):
             cycles = min(cycles, cycles_of_record)
         return cycles
     if table.cycles:
@@ -299,7 +302,7 @@ def _check_cycles_of_drive(drive: Excitation, run: RunSettings, key: str) -> Non
         end_of_ramp = f"{drive.ramp[-1][0]:g} s"
         message = f"expected at least {ceil(fewest)} cycles, {end_of_ramp}, of drive.ramp"
         raise key_error(key, message)
-    if run.cycles > most + 1e-9:
+    if run.cycles > most + _ROUNDING:
         message = "drive.repeats = true repeats one that ends as it begins"
         expected = f"expected at most {int(most)} cycles"
         raise key_error(key, f"{expected}: drive.record has no more; {message}")

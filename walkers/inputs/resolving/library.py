@@ -356,7 +356,7 @@ def _library_of_program() -> Library:
 def read_library(folder: Path) -> dict[str, Any]:
     """The tables of the user's own library in a folder, and its path at ``file``.
 
-    There are none if the folder has no library.
+    They are empty if the folder has no library.
 
     Raises
     ------

@@ -21,6 +21,8 @@ from walkers.inputs.tables.drive import unit_vector
 from walkers.inputs.tables.shapes.vessel import Plane
 from walkers.inputs.tables.shapes.walls import BOTTOM
 
+_ROUNDING = 1e-9
+"""Rounding error of the height of a point, m, and relative one of a height."""
 _WIDEST = 1000.0
 """Largest width of a vessel in diameters of the largest bead."""
 
@@ -109,10 +111,10 @@ def _of_planes(boundary: Boundary) -> tuple[Boundary, Vessel]:
     boundary = boundary.with_values(planes=_planes(boundary.planes))
     vessel = boundary.with_values(shape="vessel").vessel
     lowest = float(vessel.points[:, 2].min())
-    if abs(lowest) > 1e-9:
+    if abs(lowest) > _ROUNDING:
         problem = f"have their lowest point at z = {1e3 * lowest:.4g} mm"
         raise key_error("boundary.planes", f"{problem}; expected 0 mm")
-    if vessel.height < (1.0 - 1e-9) * present(boundary.height, "boundary.height"):
+    if vessel.height < (1.0 - _ROUNDING) * present(boundary.height, "boundary.height"):
         expected = f"expected at most {1e3 * vessel.height:.4g} mm"
         raise key_error("boundary.height", f"the planes close the vessel; {expected}")
     return boundary, vessel

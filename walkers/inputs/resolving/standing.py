@@ -171,6 +171,7 @@ def _poured(case: Case, mixture: Mixture) -> StartingGroup:
     places = _lattice_places(case.boundary.geometry.layers(largest, floor))
     beads = []
     for radius, (layer, x, y) in zip(radii, places, strict=False):  # there are more places
+        # Less than the play: beads do not touch each other or a wall.
         shift = draw.uniform(-1.0, 1.0, 2) * 0.9 * layer.play(radius, largest)
         beads.append(
             StartingBead(x + float(shift[0]), y + float(shift[1]), floor + layer.level, radius)

@@ -166,7 +166,7 @@ def _check_surfaces(case: Setup, notes: Notes) -> None:
     contact_roughness = case.contact.roughness
     values = (contact_roughness.bead_bead, contact_roughness.bead_wall)
     for key, roughness in zip(ROUGHNESS, values, strict=True):
-        if roughness > largest * (1.0 + 1e-9):
+        if roughness > largest * (1.0 + 1e-9):  # more than a rounding error
             expected = f"{1e6 * largest:.3g} um or less, a hundredth of a bead's radius"
             raise key_error(key, f"expected {expected}")
         _end_range_at(key, largest, notes)

@@ -248,7 +248,7 @@ class WalkerGeometry:
         x_of_beads = [x for x, _ in self.design]
         middle = sum(x_of_beads) / len(x_of_beads)
         largest = max(abs(x - middle) for x in x_of_beads)
-        if largest < 1e-9 * self.length:
+        if largest < 1e-9 * self.length:  # no more than a rounding error
             return (0.0,) * len(x_of_beads)
         return tuple((x - middle) / largest for x in x_of_beads)
 

@@ -78,6 +78,7 @@ class VesselShape(Container):
     def walls(self) -> tuple[Wall, ...]:
         """The planes; the first one is the floor if it is level and goes through the origin."""
         first = self.planes[0]
+        # Both but for rounding errors, the height within 1 nm.
         first_is_floor = first.normal[2] > 1.0 - 1e-12 and abs(first.point[2]) < 1e-9
         names = names_of_faces([plane.normal for plane in self.planes], floor=first_is_floor)
         walls = []
