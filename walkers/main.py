@@ -323,7 +323,7 @@ def _message_of_system(stop: BaseException) -> str:
 
 
 def _clock_is_wrong() -> bool:
-    """Whether the time of this machine is no date, as after the failure of its battery."""
+    """Whether the clock of this machine gives no valid date, as after its battery has failed."""
     try:
         datetime.now(UTC)
     except (OverflowError, ValueError, OSError):

@@ -237,7 +237,7 @@ def columns_at(curve: Curve, gaps: FloatArray) -> FloatArray:
         if negative.any():
             gap = gaps[negative][0]
             raise UnusableLawError(f"the {_COLUMNS[field]} is negative at a gap of {gap:g} m")
-    generates = coupling**2 > (1.0 + 1e-9) * sliding * rolling
+    generates = coupling**2 > (1.0 + 1e-9) * sliding * rolling  # by more than rounding errors
     if generates.any():
         gap = gaps[generates][0]
         raise UnusableLawError(

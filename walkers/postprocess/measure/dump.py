@@ -121,7 +121,7 @@ class BinaryDump:
         for _ in range(processes):
             (count,) = _COUNT.unpack_from(self._bytes, end)
             parts.append(_Part(end + _COUNT.size, count))
-            end += _COUNT.size + 8 * count
+            end += _COUNT.size + 8 * count  # bytes of a float64
         if end > len(self._bytes):
             raise struct.error
         frame = _Frame(start, end, step, parts)

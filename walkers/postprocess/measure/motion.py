@@ -433,7 +433,7 @@ def read_motion(directory: str | Path) -> Motion:
     Raises
     ------
     DumpError
-        If there is no segment, or a segment cannot be read.
+        If no segment is complete, or a segment cannot be read.
     FileNotFoundError
         If the directory is not a run directory.
 

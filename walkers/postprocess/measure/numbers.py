@@ -72,7 +72,7 @@ class Row:
 
 
 MAIN_NUMBERS = ("velocity", "right_facing", "axial_velocity", "climbs", "highest", "speed")
-"""Main numbers, of which a spread measures bands."""
+"""Main numbers of results, for which a spread measures bands."""
 NOT_SHOWN_ALONE = SHOWN["aside"]
 """Numbers that are not shown by themselves: errors of others, values of the case, conditions."""
 
@@ -265,7 +265,7 @@ def _label(quantity: Quantity, numbers: Mapping[str, Any]) -> str:
 
 
 def leaves_out_facing_down(quantity: Quantity, numbers: Mapping[str, Any]) -> bool:
-    """Tell whether a number of a slope leaves out walkers that face down, of which there are some.
+    """Tell whether a number leaves out walkers that face down a slope, if there are any.
 
     Parameters
     ----------

@@ -175,7 +175,7 @@ def declared(name: str, table: str = "") -> Quantity:
     Raises
     ------
     KeyError
-        If there is none.
+        If no such number or column is declared.
 
     Examples
     --------

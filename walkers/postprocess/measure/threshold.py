@@ -165,7 +165,7 @@ def drive_changes(peaks: FloatArray, noise: float) -> IntArray:
     peaks : ndarray, shape (K + 1,)
         Amplitude of the drive at the ends of K windows, m/s².
     noise
-        Largest change that is no reversal, m/s².
+        Largest change that does not count as a reversal, m/s².
 
     Returns
     -------

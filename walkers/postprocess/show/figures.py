@@ -473,7 +473,7 @@ def gait_figure(case: Case, tables: Tables) -> Figure:
     names = [name for name in names if np.isfinite(trajectory[name][last]).all()]
     smooth = _smooth({name: trajectory[name][last] for name in ("cycle", *names)}, "cycle")
     looks: list[Look] = []
-    widths = np.linspace(6.0, 1.1, len(names))
+    widths = np.linspace(6.0, 1.1, len(names))  # thinner lines lie upon thicker ones: all are seen
     for line, name in enumerate(names):
         label = declared(name, "trajectory").label
         mean = rounded(1e3 * walkers[name][0], "mm/s")

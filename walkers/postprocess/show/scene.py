@@ -330,6 +330,7 @@ class Scene:
         ruby = np.where(large, *RUBY)
         glass = np.where(large, *GLASS)
         packed = np.where(highlighted, ruby, glass)
+        # The bytes of red, green and blue.
         plain = (packed[:, None] >> np.array([16, 8, 0]) & 255).astype(np.float64)
         if self.orientations is None:
             return np.stack([plain, plain])

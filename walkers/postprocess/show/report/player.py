@@ -108,7 +108,7 @@ def player_of(
     Parameters
     ----------
     motion
-        The motion, of which the drive is shown.
+        The motion. The plot shows its drive, not the settling before it.
     places
         Largest number of beads times frames; frames are left out evenly.
     height

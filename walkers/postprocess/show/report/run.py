@@ -132,8 +132,9 @@ def report_values(case: Case, results: Results, origins: Origins = None) -> dict
     Returns
     -------
     dict
-        Warnings and rows of the result, what of it is not computed, what its band contains, and the
-        parameters of its case, of which some are guessed or uncertain.
+        Warnings and rows of the result, uncertainties that are not computed, what its band
+        contains, and the parameters of its case; those that are guessed or uncertain also by
+        themselves.
     """
     if origins is None:
         origins = case.origins
