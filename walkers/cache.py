@@ -1,8 +1,9 @@
 """The program's folder in the user's cache, and numbers there that take long to compute.
 
-What the cache contains is executed (the contact model) or believed (numbers, audits). Therefore
-only contents are used that nobody but the user and root can have written. A cache that others can
-write is closed, and all of its contents are forgotten.
+The cache also contains the compiled contact model, and audits: whether an engine agrees with the
+second engine. What the cache contains is executed (the model) or believed (numbers, audits).
+Therefore only contents are used that nobody but the user and root can have written. A cache that
+others can write is closed, and all of its contents are forgotten.
 """
 
 from __future__ import annotations

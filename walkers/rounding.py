@@ -17,7 +17,7 @@ SHOWN_UNITS = {
     "rad": ("°", degrees(1.0)),
     "share": ("%", 100.0),
 }
-"""For a unit of a result, the unit in which it is shown, and how many of those it is."""
+"""For the SI unit of a result, the displayed unit and the factor that converts a number to it."""
 _DECIMALS = {"": 9, "mm/s": 3, "mm": 6, "°": 3, "deg": 3, "%": 3, "nJ": 6}
 """Largest number of decimals of a number in a displayed unit.
 

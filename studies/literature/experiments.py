@@ -202,7 +202,10 @@ def symmetry(out: Path) -> Iterator[Line]:
 
 
 def _symmetric_case(frequency: int, phase: int) -> Case:
-    """A symmetric dimer that is shaken at a frequency, Hz, with a phase, degrees, and at 120 Hz."""
+    """A symmetric dimer under a tone of 4 g, of a frequency (Hz) and phase (°), and one of 3 g.
+
+    The second tone has 120 Hz, and a phase that is larger by 90°.
+    """
     document = load_case("symmetric", {"dimers.replicates": 1, "run.cycles": 30}).document
     first = {
         "frequency": f"{frequency} Hz",

@@ -218,7 +218,10 @@ def load_sweep(
 
 
 def _name_with(name: str, changes: Mapping[str, Value]) -> str:
-    """The name of a sweep with changes, which differs from the name without them."""
+    """The name of a sweep with changes, which differs from the name without them.
+
+    It ends with the changes, or with a digest of them if it would be too long.
+    """
     settings = ",".join(f"{key}={value}" for key, value in changes.items())
     text = f"{name},{settings}"
     full_name = re.sub(r"[^\w.+=,-]+", "_", text)

@@ -12,7 +12,8 @@ class Dimer:
     """The two beads of a walker, and what follows from them in the symbols of the paper.
 
     Bead 1 is the first bead of the case. Khan et al.: sin δ = (R1 − R2)/(R1 + R2), μ = (m1 − m2)/M,
-    R̄ = (R1 + R2)/2, Γ0 = a0 M/(4πγR̄) (their Eq. 1).
+    R̄ = (R1 + R2)/2, Γ0 = a0 M/(4πγR̄) (their Eq. 1): the inertial force at the peak acceleration a0
+    over the mean capillary force.
 
     Attributes
     ----------

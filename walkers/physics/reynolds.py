@@ -115,7 +115,10 @@ def curve(surfaces: Surfaces, pull: Callable[[FloatArray], FloatArray], rupture:
 def resistances(
     surfaces: Surfaces, gaps: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """N and S (N s/m), C (N s), Q (N m s) of a bridge at gaps, m, each of shape (n,)."""
+    """N and S (N s/m), C (N s), Q (N m s) of a bridge at gaps, m, each of shape (n,).
+
+    The liquid fills a gap that is wider by the roughness. Surfaces that overlap count as touching.
+    """
     eta = surfaces.liquid.viscosity
     radius = surfaces.reduced_radius
     gap = np.maximum(gaps, 0.0) + surfaces.roughness

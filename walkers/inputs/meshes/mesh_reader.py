@@ -50,13 +50,14 @@ _VTK_READERS = {
 }
 """Modules and names of VTK's readers by the endings of files."""
 _CORNERS_OF_VTK_CELLS = {
-    5: (0, 1, 2),
+    5: (0, 1, 2),  # a triangle
     8: (0, 1, 3, 2),  # a pixel, whose corners are in rows
-    9: (0, 1, 2, 3),
-    22: (0, 1, 2),  # quadratic cells, of which the corners come first
-    23: (0, 1, 2, 3),
-    28: (0, 1, 2, 3),
-    34: (0, 1, 2),
+    9: (0, 1, 2, 3),  # a quadrilateral
+    # Quadratic and biquadratic cells have more points, which follow their corners.
+    22: (0, 1, 2),  # a quadratic triangle
+    23: (0, 1, 2, 3),  # a quadratic quadrilateral
+    28: (0, 1, 2, 3),  # a biquadratic quadrilateral
+    34: (0, 1, 2),  # a biquadratic triangle
 }
 """Places of the corners, counterclockwise, among the points of flat cells, by VTK's numbers of
 cell types."""

@@ -236,7 +236,10 @@ def _place_of(name: str) -> int | None:
 
 
 def _factor_of(head: str, unit: str, kind: QuantityKind) -> float:
-    """A unit in SI units."""
+    """The value of a unit of time or acceleration in SI units, in any of the spellings of loggers.
+
+    Raises `ValueError`, with the head of the column, for a unit of another kind.
+    """
     if kind is ACCELERATION:
         if unit in _METRE_PER_SECOND_SQUARED:
             unit = "m/s^2"

@@ -222,6 +222,7 @@ def _sources(run: RunSettings, case: Setup, reason: str) -> dict[str, Source]:
 
 
 def _source_of_samples(run: RunSettings, case: Setup) -> Source:
+    """The source of the samples per cycle, in words if there are fewer than one."""
     text = ""
     if run.cycles_per_sample != 1:
         text = f"1 in {run.cycles_per_sample} cycles"
@@ -231,6 +232,7 @@ def _source_of_samples(run: RunSettings, case: Setup) -> Source:
 
 
 def _source_of_cycles(run: RunSettings, case: Setup) -> Source:
+    """The source of the number of cycles, in words if the run may end earlier."""
     text = ""
     if run.until_steady:
         why = "checked after 12 and 24 cycles"
@@ -247,6 +249,7 @@ def _source_of_cycles(run: RunSettings, case: Setup) -> Source:
 
 
 def _source_of_settling_cycles(run: RunSettings, case: Setup) -> Source:
+    """The source of the settling cycles, which depend on the cycles if the run may end earlier."""
     if not case.walkers:
         return Source("default", "of loose beads")
     text = ""

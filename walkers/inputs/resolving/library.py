@@ -241,7 +241,10 @@ def _tables_of_program() -> dict[str, Any]:
 def _number(
     entry: Mapping[str, Any], collection: Collection, liquids: tuple[str, ...] = ()
 ) -> LibraryNumber:
-    """The number of an entry such as ``{ value = …, source = "…" }``; ``liquids`` calibrated it."""
+    """The number of an entry such as ``{ value = …, source = "…" }``.
+
+    ``liquids`` are the names of the liquids with which it was calibrated, if it was.
+    """
     source = entry.get("source", "")
     if "source" not in entry and liquids:
         source = f"calibrated with {' and '.join(liquids)}"

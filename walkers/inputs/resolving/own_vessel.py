@@ -93,7 +93,7 @@ def _length_text(length: float) -> str:
 
 
 def _of_mesh(boundary: Boundary, mesh: str, document: Mapping[str, Any]) -> tuple[Boundary, Vessel]:
-    """The boundary with the walls of a mesh, and its surface."""
+    """The boundary with the planes of a mesh, or else with its triangles, and its surface."""
     try:
         vessel = vessel_of(document["meshes"][mesh], present(boundary.scale, "boundary.scale"))
     except (KeyError, IndexError, TypeError, ValueError) as error:

@@ -303,7 +303,10 @@ def _beads_at_start(case: Case) -> list[_BeadAtStart]:
 
 
 def _cut_by_walls(case: Case, beads: Sequence[_BeadAtStart]) -> list[_BeadAtStart]:
-    """The beads that side walls cut, and walkers' beads beside the floor of a vessel."""
+    """The beads that overlap with side walls by more than `OVERLAP`.
+
+    If there are walkers, also the beads that are not above the floor of a vessel.
+    """
     places = np.array([bead.place for bead in beads])
     clearances = case.boundary.geometry.side_clearance(places)
     if case.walkers:

@@ -161,7 +161,10 @@ def _liquid(liquid: LiquidTable, notes: Notes) -> Liquid:
 
 
 def _check_surfaces(case: Setup, notes: Notes) -> None:
-    """Refuse roughness that is large compared with the beads, and menisci that do not fit."""
+    """Refuse roughness that is large compared with the beads, and menisci that do not fit.
+
+    Ranges of uncertain roughness are made to end at the largest value that is not refused.
+    """
     largest = _LARGEST_ROUGHNESS * min(case.radii)
     contact_roughness = case.contact.roughness
     values = (contact_roughness.bead_bead, contact_roughness.bead_wall)

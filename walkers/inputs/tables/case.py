@@ -364,7 +364,10 @@ class Case(Setup):
         return tuple(origins.values())
 
     def _origin_of(self, name: str, value: Any, kind: QuantityKind | None) -> Origin | None:
-        """Origin of a value by its dotted key; None if the case has no value there."""
+        """Origin of a value by its dotted key: the file, else its noted source, else the default.
+
+        None if the case has no value there.
+        """
         given = value_at(self.document, parts_of(name))
         if given is not MISSING and not units.is_auto(given):
             if name == "run.time_step":

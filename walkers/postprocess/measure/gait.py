@@ -111,13 +111,17 @@ def gait(group: Group) -> Gait:
 
 
 def _sliding_of_pair(group: Group, first: int, second: int) -> FloatArray:
-    """Sliding velocity between two beads of each walker, m/s, shape (F, W)."""
+    """Sliding velocity between two beads of each walker, m/s, shape (F, W).
+
+    The line between their centres, seen from above, is taken in the direction of the heading; the
+    axis is perpendicular to it. The velocity is 0 for beads one above the other.
+    """
     radii = group.radii
     arm = group.position[:, :, first] - group.position[:, :, second]
     arm[..., 2] = 0.0
     points_back = np.einsum("fwx,fwx->fw", arm, group.heading) < 0.0
     arm *= np.where(points_back, -1.0, 1.0)[..., None]
-    arm /= np.maximum(np.linalg.norm(arm, axis=-1, keepdims=True), 1e-300)  # 0 for vertical pairs
+    arm /= np.maximum(np.linalg.norm(arm, axis=-1, keepdims=True), 1e-300)
     spin = radii[first] * group.spin[:, :, first] + radii[second] * group.spin[:, :, second]
     sliding: FloatArray = -np.einsum("fwx,fwx->fw", spin, np.cross(_Z, arm))
     return sliding

@@ -1,7 +1,9 @@
 """The motion of a run's beads and their bridges, over all of its segments, as arrays.
 
-`read_motion` reads a run directory. This module does not measure: it gives positions, velocities,
-headings, gaps and bridges, from which the other modules of this package compute tables and numbers.
+A run consists of one or more *segments*, folders with dumps of their own, each of which continues
+the one before. `read_motion` reads a run directory. This module does not measure: it gives
+positions, velocities, headings, gaps and bridges, from which the other modules of this package
+compute tables and numbers.
 """
 
 from __future__ import annotations
@@ -571,7 +573,11 @@ def _read_vectors(segments: Sequence[_Segment]) -> dict[str, FloatArray]:
 
 
 def _joined(case: Case, segments: Sequence[_Segment]) -> Motion:
-    """The motion over all segments of a run."""
+    """The motion over all segments of a run.
+
+    The engine's steps become times since the start of the drive, and its positions and velocities
+    become relative to the walls.
+    """
     run = case.run
     first = segments[0]
     last = segments[-1]

@@ -1,7 +1,8 @@
 """Numbers of results as rows of text: of the printed result, reports and notebooks.
 
 It decides which numbers of a result are shown, how they are called, and with how many digits.
-Names, units and meanings are declared in `walkers.postprocess.measure.quantities`.
+Names, units and meanings are declared in `walkers.postprocess.measure.quantities`. Bands and their
+draws are explained in `walkers.postprocess.measure.uncertainty`.
 """
 
 from __future__ import annotations

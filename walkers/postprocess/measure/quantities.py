@@ -232,7 +232,7 @@ def described_columns(names: Iterable[str]) -> dict[str, tuple[str, str]]:
 
 
 def unit_shown(unit: str) -> tuple[str, float]:
-    """The displayed unit of an SI unit, and how many of it one SI unit is."""
+    """The displayed unit for an SI unit, and the factor that converts a number to it."""
     return SHOWN_UNITS.get(unit, (unit, 1.0))
 
 

@@ -58,7 +58,7 @@ MODULES: tuple[MeasuringModule, ...] = (walking, threshold, meetings, piles, rec
 _BEFORE_MODULES = 2
 """Version of all modules in results that do not contain versions of modules."""
 _ENTRIES = ("case", "drive", "rests_on", "by_hand", "tables", "warnings")
-"""Entries that ``result.json`` has besides the numbers."""
+"""Entries of ``result.json`` other than the numbers."""
 _DRIVE_NUMBERS = ("frequency", "peak_acceleration", "peak_velocity", "amplitude")
 """Numbers of all results that follow from the drive."""
 

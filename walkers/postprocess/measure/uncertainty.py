@@ -1,7 +1,11 @@
 """Uncertainty of a result: unmeasured values, and the band of the result over their ranges.
 
-It reads what `walkers.sweeps.spread` and `walkers.sweeps.accuracy` have written beside and in a run
-directory. It runs nothing.
+A *spread* makes a run many times, each time with values that are drawn from the ranges of the
+uncertain ones: each of these runs is a *draw*. The *band* of a number contains the middle 90 % of
+the draws.
+
+This module reads what `walkers.sweeps.spread` and `walkers.sweeps.accuracy` have written beside and
+in a run directory. It runs nothing.
 """
 
 from __future__ import annotations

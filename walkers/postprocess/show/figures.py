@@ -557,7 +557,10 @@ def _interpolated(
 
 @styled
 def paths_figure(case: Case, tables: Tables) -> Figure:
-    """Draw paths of walkers that may meet, once per cycle, their beads at the end, and the edge."""
+    """Draw paths of walkers that may meet, with a point per cycle, and their beads at the end.
+
+    In a container, the edge of its floor is drawn too.
+    """
     trajectory = tables("trajectory")  # one walker after the other
     walkers = tables("walkers")
     count = len(walkers["walker"])

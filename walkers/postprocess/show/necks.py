@@ -213,7 +213,7 @@ def neck_surfaces(
 def _neck_radius(
     motion: Motion, radius: FloatArray, second_radius: FloatArray, gap: FloatArray
 ) -> FloatArray:
-    """Radius b of straight necks (see above), m; a wall has an infinite ``second_radius``."""
+    """Radius b of straight necks (see the module), m; a wall has an infinite ``second_radius``."""
     liquid = motion.case.liquid.of_bridges
     volume_of = np.vectorize(bridge_volume, [float], excluded=[2])
     volume = volume_of(radius, second_radius, liquid)

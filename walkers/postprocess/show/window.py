@@ -409,7 +409,7 @@ class _Copies:
         """
         if rotations is None:
             rotations = np.tile(np.eye(3), (len(centres), 1, 1))
-        # The points of a unit sphere are its normals. Shadows are lit alike whatever theirs are.
+        # The points of a unit sphere are its normals. Shadows are not lit: theirs do not matter.
         normals = self._points @ np.swapaxes(rotations, 1, 2).astype(np.float32)
         points = self._radius * normals + centres[:, None].astype(np.float32)
         self._mesh.points = points.reshape(-1, 3)
