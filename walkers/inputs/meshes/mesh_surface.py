@@ -173,8 +173,8 @@ def _toward_beads(vessel: Vessel) -> Vessel:
     outer = int(vessel.parts[vessel.outer][0])
     lids = np.full(len(volumes) - len(vessel.parts), outer)
     sizes = np.bincount(np.append(vessel.parts, lids), volumes)
-    turned = (sizes[vessel.parts] > 0.0) == vessel.outer
-    triangles = np.where(turned[:, None], vessel.triangles[:, ::-1], vessel.triangles)
+    is_flipped = (sizes[vessel.parts] > 0.0) == vessel.outer
+    triangles = np.where(is_flipped[:, None], vessel.triangles[:, ::-1], vessel.triangles)
     return Vessel(vessel.points, triangles)
 
 
@@ -264,8 +264,8 @@ def _is_in_another(vessel: Vessel, bodies: Mapping[int, FloatArray], number: int
         if other_number == number or reaches_lower or reaches_higher:
             continue
         triangles = vessel.triangles[vessel.parts == other_number]
-        turned = Vessel(vessel.points, triangles[:, ::-1])  # a closed vessel
-        if turned.clearance(points[:1])[0] > 0.0:
+        body_as_vessel = Vessel(vessel.points, triangles[:, ::-1])  # a closed vessel
+        if body_as_vessel.clearance(points[:1])[0] > 0.0:
             return True
     return False
 
@@ -338,11 +338,11 @@ def _check_opens_nowhere(solid: Vessel) -> None:
     """Refuse a solid vessel that opens in another direction than up."""
     for name, (axis, sign) in _AXES.items():
         order = [(axis + 1) % 3, (axis + 2) % 3, axis]
-        turned = solid.points[:, order] * [sign, 1.0, sign]  # `name` is up
-        basin = _largest_basin(Vessel(turned, solid.triangles))
-        if basin and basin.depth > _DEEP_BASIN * np.ptp(turned[:, 2]):
+        turned_points = solid.points[:, order] * [sign, 1.0, sign]  # `name` is up
+        basin = _largest_basin(Vessel(turned_points, solid.triangles))
+        if basin and basin.depth > _DEEP_BASIN * np.ptp(turned_points[:, 2]):
             problem = f"is a solid whose inside opens toward {name},"
-            at_opening = solid.points[turned[:, 2].argmax()]
+            at_opening = solid.points[turned_points[:, 2].argmax()]
             expected = "an opening toward +z, which is up: rotate the mesh"
             raise _mesh_error(problem, at_opening, expected)
 
@@ -403,8 +403,8 @@ def _pieces_at_saddles(solid: Vessel) -> list[tuple[frozenset[int], float]]:
             if piece_of[neighbour] >= 0:
                 joining.add(int(piece_of[neighbour]))
         if len(joining) > 1:  # a saddle
-            deep = [piece for piece in joining if height - bottoms[piece] > least_depth]
-            pieces += [(frozenset(points_of[piece]), height) for piece in deep]
+            deep_pieces = [piece for piece in joining if height - bottoms[piece] > least_depth]
+            pieces += [(frozenset(points_of[piece]), height) for piece in deep_pieces]
         largest = max(joining, key=lambda piece: len(points_of[piece]), default=point)
         points_of.setdefault(largest, []).append(point)
         bottoms.setdefault(largest, height)

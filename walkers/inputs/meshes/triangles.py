@@ -64,8 +64,8 @@ def merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArra
     """
     from scipy.spatial import cKDTree
 
-    near = SAME_POINT * float(np.ptp(points, axis=0).max())
-    pairs = cKDTree(points).query_pairs(near, output_type="ndarray")
+    same_point_distance = SAME_POINT * float(np.ptp(points, axis=0).max())
+    pairs = cKDTree(points).query_pairs(same_point_distance, output_type="ndarray")
     groups = groups_of(pairs, len(points))
     _, first_of_group, group_numbers = np.unique(groups, return_index=True, return_inverse=True)
     points = points[first_of_group]
@@ -74,7 +74,7 @@ def merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArra
     longest = np.linalg.norm(sides, axis=2).max(axis=1)
     area_vectors = np.cross(sides[:, 0], sides[:, 1])
     # Twice the area of a triangle over its longest side is its height.
-    is_wide = np.linalg.norm(area_vectors, axis=1) > near * longest
+    is_wide = np.linalg.norm(area_vectors, axis=1) > same_point_distance * longest
     _, first_of_triangle = np.unique(np.sort(triangles, axis=1), axis=0, return_index=True)
     triangles = triangles[[number for number in sorted(first_of_triangle) if is_wide[number]]]
     if not len(triangles):

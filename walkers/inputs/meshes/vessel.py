@@ -462,11 +462,11 @@ class Vessel:
         places = np.einsum("nk,nkx->nx", shares, self.points[self.triangles[touched]])
         places += radius * self.face_normals[touched]
         low, high = self._boxes
-        near = 0
+        facet_count = 0
         for place in places:
             outside = np.maximum(0.0, np.maximum(low - place, place - high))
-            near += int((np.linalg.norm(outside, axis=1) < (1.0 + _NEAR) * radius).sum())
-        return near / _TOUCHING_BEADS
+            facet_count += int((np.linalg.norm(outside, axis=1) < (1.0 + _NEAR) * radius).sum())
+        return facet_count / _TOUCHING_BEADS
 
     @cached_property
     def _boxes(self) -> tuple[FloatArray, FloatArray]:

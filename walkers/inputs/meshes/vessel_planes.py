@@ -38,15 +38,15 @@ def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Ve
     """
     from scipy.spatial import HalfspaceIntersection
 
-    far = _MOST_EXTENT * height
-    ends = _end_planes(height, far)
+    far_distance = _MOST_EXTENT * height
+    ends = _end_planes(height, far_distance)
     points = np.array([point for point, _ in (*planes, *ends)])
     normals = np.array([normal for _, normal in (*planes, *ends)])
     offsets = np.einsum("px,px->p", normals, points)
     inside = _place_inside(normals, offsets)
     intersection = HalfspaceIntersection(np.column_stack([-normals, offsets]), inside)
     corners = intersection.intersections
-    _check_closed(corners, far)
+    _check_closed(corners, far_distance)
     triangles: list[list[int]] = []
     for number, normal in enumerate(normals[: len(planes)]):
         at_plane = []
@@ -61,11 +61,11 @@ def vessel_between(planes: Sequence[tuple[Vector, Vector]], height: float) -> Ve
     return Vessel(*merged(corners, np.array(triangles)))
 
 
-def _end_planes(height: float, far: float) -> list[tuple[Vector, Vector]]:
-    """Planes that end the vessel: at its height (m), and far away (m) on the other sides."""
+def _end_planes(height: float, far_distance: float) -> list[tuple[Vector, Vector]]:
+    """Planes that end the vessel: at its height (m), and far away on the other sides."""
     ends: list[tuple[Vector, Vector]] = [((0.0, 0.0, height), (0.0, 0.0, -1.0))]
     inward_axes = [*np.eye(3), *-np.eye(3)[:2]]
-    ends += [(_vector(-far * axis), _vector(axis)) for axis in inward_axes]
+    ends += [(_vector(-far_distance * axis), _vector(axis)) for axis in inward_axes]
     return ends
 
 
@@ -97,9 +97,9 @@ def _place_inside(normals: FloatArray, offsets: FloatArray) -> FloatArray:
     return np.asarray(best.x[:3])
 
 
-def _check_closed(corners: FloatArray, far: float) -> None:
-    """Refuse planes of which some corners, shape (n, 3), are at the far planes (m)."""
-    if np.abs(corners).max() <= _AT_FAR_PLANE * far:
+def _check_closed(corners: FloatArray, far_distance: float) -> None:
+    """Refuse planes of which some corners, shape (n, 3), are on the far planes."""
+    if np.abs(corners).max() <= _AT_FAR_PLANE * far_distance:
         return
     farthest = corners[np.abs(corners).max(axis=1).argmax()]
     problem = f"are open toward {axis_name(farthest)}"

@@ -117,8 +117,8 @@ def local_amplitude(samples: FloatArray, frequency: float, width: int) -> FloatA
         Largest length of the vector in a cycle.
     """
     weights = _centred_window(samples, width)
-    turned = samples * np.exp(-2j * pi * frequency * np.arange(len(samples)))[:, None]
-    phasor = 2.0 * _convolved(turned, weights)
+    demodulated = samples * np.exp(-2j * pi * frequency * np.arange(len(samples)))[:, None]
+    phasor = 2.0 * _convolved(demodulated, weights)
     amplitude = longest(phasor)
     before = len(weights) // 2
     return np.pad(amplitude, (before, len(samples) - len(amplitude) - before), "edge")
@@ -144,9 +144,9 @@ def periods_by_phase(samples: FloatArray, periods: float) -> float:
     start_of_second = len(samples) - half
     number = np.arange(len(samples))
     for _ in range(2):
-        turned = samples * np.exp(-2j * pi * periods / len(samples) * number)[:, None]
-        first = weights @ turned[:half]
-        second = weights @ turned[start_of_second:]
+        demodulated = samples * np.exp(-2j * pi * periods / len(samples) * number)[:, None]
+        first = weights @ demodulated[:half]
+        second = weights @ demodulated[start_of_second:]
         turn = float(np.angle(np.vdot(first, second)))
         periods += turn / (2.0 * pi) * len(samples) / start_of_second
     return periods

@@ -376,8 +376,8 @@ def _check_overlaps(beads: Sequence[_BeadAtStart]) -> None:
     from scipy.spatial import cKDTree
 
     largest = max(bead.radius for bead in beads)
-    near = cKDTree([bead.place for bead in beads]).query_pairs(2.0 * largest)
-    for first_number, second_number in sorted(near, key=lambda pair: pair[::-1]):
+    near_pairs = cKDTree([bead.place for bead in beads]).query_pairs(2.0 * largest)
+    for first_number, second_number in sorted(near_pairs, key=lambda pair: pair[::-1]):
         first = beads[first_number]
         second = beads[second_number]
         if first.walker is not None and first.walker == second.walker:

@@ -86,8 +86,8 @@ def pull(
     f4 = _by_volume_and_angle(_F4, v, contact_angle)
     # At contact ln s is -∞; a very small gap gives the same force.
     s = logarithm(np.maximum(gaps, 1e-9 * radius) / 2.0 / sqrt(volume / radius))
-    apart = np.where(gaps > 0.0, exponential(f3 * s + f4 * s**2), 0.0)
-    return 2.0 * pi * radius * exponential(f1 - f2 * apart)
+    decay = np.where(gaps > 0.0, exponential(f3 * s + f4 * s**2), 0.0)
+    return 2.0 * pi * radius * exponential(f1 - f2 * decay)
 
 
 def rupture(radius_1: float, radius_2: float, volume: float, contact_angle: float) -> float:

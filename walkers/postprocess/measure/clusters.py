@@ -225,12 +225,12 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[HeldCluster]]) -> list[
     """
     tracks: list[Track] = []
     alive: list[int] = []
-    for frame, present in enumerate(clusters):
+    for frame, clusters_now in enumerate(clusters):
         now = time[frame]
         alive = [number for number in alive if now - time[tracks[number].frames[-1]] <= MAX_GAP]
         track_at: dict[int, int] = {}  # number of the track that continues with each cluster
         ended = set()
-        for number, place in _overlaps(tracks, alive, present):
+        for number, place in _overlaps(tracks, alive, clusters_now):
             if number in track_at.values() or number in ended:
                 continue
             if place in track_at:
@@ -240,7 +240,7 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[HeldCluster]]) -> list[
             else:
                 track_at[place] = number
         alive = [number for number in alive if number not in ended]
-        for place, cluster in enumerate(present):
+        for place, cluster in enumerate(clusters_now):
             if place not in track_at:
                 track_at[place] = len(tracks)
                 alive.append(len(tracks))
@@ -253,16 +253,16 @@ def follow(time: FloatArray, clusters: Iterable[Sequence[HeldCluster]]) -> list[
 
 
 def _overlaps(
-    tracks: Sequence[Track], alive: Iterable[int], present: Sequence[HeldCluster]
+    tracks: Sequence[Track], alive: Iterable[int], clusters_now: Sequence[HeldCluster]
 ) -> list[tuple[int, int]]:
-    """Numbers of tracks and places of present clusters that share enough beads.
+    """Numbers of tracks, and indices of the clusters of a frame that share enough beads with them.
 
     The largest overlap comes first: of two tracks that merge, the one with more beads continues.
     """
     overlaps = []
     for number in alive:
         before = tracks[number].members[-1]
-        for place, cluster in enumerate(present):
+        for place, cluster in enumerate(clusters_now):
             common = len(before & cluster.members)
             if common >= MIN_OVERLAP * min(len(before), len(cluster.members)):
                 overlaps.append((common, -number, place))

@@ -129,13 +129,13 @@ def _measure_frames(motion: Motion) -> _Frames:
     for bridges in read_bridges(motion):
         labels = clusters.connected(len(motion.radius), bridges.beads)
         bulk = clusters.bulk_of(labels, bridges, heap=heap, floor=floor)
-        present: list[HeldCluster] = []
+        clusters_now: list[HeldCluster] = []
         # While the pile settles, most beads are free of the bulk.
         if motion.time[bridges.frame] >= 0.0:
-            present = list(clusters.held_clusters(labels, bridges, bulk, floor))
-        rows.append(_state_of(motion, bridges, bulk, present, floor))
+            clusters_now = list(clusters.held_clusters(labels, bridges, bulk, floor))
+        rows.append(_state_of(motion, bridges, bulk, clusters_now, floor))
         bulks.append(bulk)
-        clusters_of_frames.append(present)
+        clusters_of_frames.append(clusters_now)
     bed: Columns = {}
     for name in rows[0]:
         bed[name] = np.array([row[name] for row in rows])
@@ -166,14 +166,14 @@ def _of_bed(motion: Motion, bed: Columns) -> dict[str, Any]:
     """
     time = motion.time
     end = time[-1]
-    rest = max(int(np.searchsorted(time, 0.0, side="right")) - 1, 0)
+    frame_at_rest = max(int(np.searchsorted(time, 0.0, side="right")) - 1, 0)
     second_half = time >= min(time[motion.first_driven :].mean(), end)
     numbers = {"driven": float(max(end, 0.0)), "settling": float(min(end, 0.0) - time[0])}
     for name in ("surface", "brazil_nut"):
         numbers[f"{name}_start"] = float(bed[name][motion.first_driven])
         numbers[f"{name}_end"] = float(bed[name][-1])
     for name in ("contacts", "bridges"):
-        numbers[f"{name}_at_rest"] = float(bed[name][rest])
+        numbers[f"{name}_at_rest"] = float(bed[name][frame_at_rest])
         numbers[f"{name}_shaken"] = nan
         if end > 0.0:
             numbers[f"{name}_shaken"] = float(np.mean(bed[name][second_half]))

@@ -316,8 +316,8 @@ def _is_outdated(directory: Path, versions: Mapping[str, Any] | None) -> bool:
             return False
         case = case_of(directory)
         return any(module.applies(case) for module in changed)
-    present = {module.NAME: module.VERSION for module in MODULES}
-    return any(present.get(name) != version for name, version in versions.items())
+    current_versions = {module.NAME: module.VERSION for module in MODULES}
+    return any(current_versions.get(name) != version for name, version in versions.items())
 
 
 def ensure_measured(directory: Path) -> None:
@@ -346,10 +346,10 @@ def json_numbers(numbers: Mapping[str, Any]) -> dict[str, Any]:
 
 def _json_number(number: Any) -> Any:
     """A number as JSON type."""
-    plain = number.item() if hasattr(number, "item") else number
-    if isinstance(plain, float) and not isfinite(plain):
+    python_number = number.item() if hasattr(number, "item") else number
+    if isinstance(python_number, float) and not isfinite(python_number):
         return None
-    return plain
+    return python_number
 
 
 def text(results: Results, *, cached: bool = False) -> str:

@@ -199,8 +199,8 @@ def _read(directory: Path, name: str) -> Any:
     path = directory / f"{name}.parquet"
     if not path.exists():
         tables = sorted(file.stem for file in directory.glob("*.parquet"))
-        present = ", ".join(tables) if tables else "none"
-        raise input_error(directory, f"has no table {name}; it has {present}")
+        table_names = ", ".join(tables) if tables else "none"
+        raise input_error(directory, f"has no table {name}; it has {table_names}")
     try:
         # Not pq.read_table, which imports pandas and pyarrow.dataset: a third of a second.
         return pq.ParquetFile(pa.BufferReader(read_regular(path))).read()

@@ -661,11 +661,11 @@ def climb_figure(case: Case, tables: Tables) -> Figure:
         _two_lines("bridges", "contacts"),
     ]
     figure, panels = _draw_figure("climb", case, {"members": leaders, "bed": bed}, looks, {})
-    heights, _, joined = panels
+    heights, _, bridges_panel = panels
     _draw_surface(heights, bed)
     _draw_events(heights, tables("events"))
-    joined.set_ylabel("number per bead")
-    joined.axhline(0.0, color="0.4", lw=0.6)
+    bridges_panel.set_ylabel("number per bead")
+    bridges_panel.axhline(0.0, color="0.4", lw=0.6)
     for axes in panels:
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), borderaxespad=0.0)
     letter_panels(panels)

@@ -208,9 +208,9 @@ def _scene_of(motion: Motion, times: FilmTimes, options: FilmOptions) -> Scene:
     width, height = options.size
     frames = slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
     extent_factor = _TRAY_EXTENT_FACTOR if from_above(motion.case) else _EXTENT_FACTOR
-    whole = Scene.around(motion, camera_axes(motion), extent_factor, frames)
-    whole = replace(whole, rolling=True)
-    return whole.following(width / height, _EXTENT_FACTOR, frames)
+    view_of_path = Scene.around(motion, camera_axes(motion), extent_factor, frames)
+    view_of_path = replace(view_of_path, rolling=True)
+    return view_of_path.following(width / height, _EXTENT_FACTOR, frames)
 
 
 @dataclass(frozen=True)

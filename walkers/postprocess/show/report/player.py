@@ -360,12 +360,12 @@ def _necks(
     for frame in range(len(bridges)):
         # Of bridges that form or rupture, the necks without width, too.
         neighbours = is_bridged[max(frame - 1, 0) : frame + 2]
-        near = np.flatnonzero(neighbours.any(axis=0))
-        ends = bridge_ends(motion, position[frame], contacts[near])
-        is_hidden = at_front_walls(motion, contacts[near], ends, toward)
-        width = (is_bridged[frame, near] & ~is_hidden).astype(float)
-        necks, _ = neck_surfaces(motion, contacts[near], ends, grid, width)
-        points[frame, near] = necks if path is None else necks - path[frame]
+        drawn_contacts = np.flatnonzero(neighbours.any(axis=0))
+        ends = bridge_ends(motion, position[frame], contacts[drawn_contacts])
+        is_hidden = at_front_walls(motion, contacts[drawn_contacts], ends, toward)
+        width = (is_bridged[frame, drawn_contacts] & ~is_hidden).astype(float)
+        necks, _ = neck_surfaces(motion, contacts[drawn_contacts], ends, grid, width)
+        points[frame, drawn_contacts] = necks if path is None else necks - path[frame]
     course = _rounded(points.reshape(len(bridges), -1, 3))
     mesh = k3d.mesh(
         points[0].reshape(-1, 3).astype(np.float32),
