@@ -98,7 +98,8 @@ def beach_ball(cells: int, motion: Motion) -> tuple[FloatArray, IntArray, IntArr
     triangles : ndarray of int, shape (T, 3)
         Corners of the triangles.
     shade : ndarray of int, shape (V,)
-        0 for the points of dark lunes, 1 for those of pale ones, as in `Scene.colours`.
+        0 for the points of dark lunes, 1 for those of pale ones, as in
+        `walkers.postprocess.show.scene.Scene.colours`.
     """
     import pyvista as pv
 
