@@ -684,7 +684,7 @@ def run(
     """
     named = find(case, out)
     if not force:
-        finished = finished_at(named)
+        finished = finished_run_of(named)
         if finished:
             return finished
     requested = named.case
@@ -705,10 +705,16 @@ def run(
     return Run(place, cached=not runs[place.name], requested=requested)
 
 
-def finished_at(named: Reference) -> Run | None:
-    """Find the finished run with a name or a directory; a deck that was run by hand becomes a run.
+def finished_run_of(named: Reference) -> Run | None:
+    """The finished run that a name means; None for a case, and for a run that is not finished.
 
-    None for a case, and for a run that is not finished.
+    A deck that was run by hand first becomes a run (`walkers.runs.by_hand.take_in`). The run is
+    measured again if its result or a table cannot be read.
+
+    Raises
+    ------
+    InputError
+        If a deck that was run by hand has not ended well, or files of the run cannot be read.
     """
     if named.means_case or named.kind not in ("run", "deck"):
         return None

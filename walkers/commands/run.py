@@ -134,7 +134,7 @@ def run(
         Also run with smaller time steps and harder beads, and print the numerical error of the
         result.
     """
-    from walkers.api import case_to_run, finished_at
+    from walkers.api import case_to_run, finished_run_of
     from walkers.runner.failures import EngineFailure
     from walkers.runs.names import find
     from walkers.runs.preview import notes
@@ -147,7 +147,7 @@ def run(
     references = [find(case, lookup.out, lookup.values) for case in cases]
     finished_runs: list[walkers.Run | None] = [None] * len(references)
     if not force:
-        finished_runs = apply_all(finished_at, references)
+        finished_runs = apply_all(finished_run_of, references)
     loaded = apply_all(case_to_run, zip(references, finished_runs, strict=True))
     if accuracy:
         apply_all(modulus_factors, loaded)
