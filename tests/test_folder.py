@@ -677,8 +677,8 @@ def test_compared_runs_tell_their_bands_or_how_to_have_them(fast_and_slow: Compa
         "fast: velocity rests on 1 uncertain value, 0 guessed; "
         "the band over the ranges is not computed (--spread)",
         "slow: velocity (mm/s), band 0.8 to 1.2 (64 draws)",
-        "1 uncertain value belongs to both runs and may be equal in both: "
-        "the bands may overlap although the difference is certain",
+        "the runs have 1 uncertain value in common, which may shift both results alike: "
+        "the difference can be certain even if the bands overlap",
     ]
 
 

@@ -409,7 +409,7 @@ def _error_lines(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun
 
 
 def _band_lines(runs: Sequence[_FinishedRun]) -> list[str]:
-    """The band of each run, and the number of uncertain values on which both runs rest."""
+    """The band of each run, and the number of uncertain values that both runs have in common."""
     lines = []
     for run in runs:
         band = _band_text(run.results)
@@ -418,11 +418,10 @@ def _band_lines(runs: Sequence[_FinishedRun]) -> list[str]:
     first, second = runs
     shared = _uncertain_keys(first.results) & _uncertain_keys(second.results)
     if shared:
-        belong = "belongs" if len(shared) == 1 else "belong"
-        values = f"{counted(len(shared), 'uncertain value')} {belong} to both runs"
+        values = f"the runs have {counted(len(shared), 'uncertain value')} in common"
         lines.append(
-            f"{values} and may be equal in both: "
-            "the bands may overlap although the difference is certain"
+            f"{values}, which may shift both results alike: "
+            "the difference can be certain even if the bands overlap"
         )
     return lines
 
