@@ -1,4 +1,8 @@
-"""Spread of a result: the case with all unmeasured values drawn from their ranges."""
+"""Spread of a result: the case with all unmeasured values drawn from their ranges.
+
+A *draw* is one run of the case with a value from each range; the *band* of a result goes from the
+5th to the 95th percentile of the draws.
+"""
 
 from __future__ import annotations
 
@@ -264,7 +268,7 @@ def run_spread(  # noqa: PLR0913
 def spread_in(
     table: pd.DataFrame, case: Case, directory: Path, failures: Sequence[Failure] = ()
 ) -> Spread:
-    """The spread of a case by the table of its sweep.
+    """The spread of a case, from the table of its sweep.
 
     Parameters
     ----------
@@ -278,10 +282,10 @@ def spread_in(
         The failed points.
     """
     finished = table[table["status"] == "finished"]
-    whole = walking_points(finished)
+    not_separated = walking_points(finished)
     if "velocity" in table:
-        names = [main_columns(whole)[0]]
-        counts = _counts_of_outcomes(finished, whole, names[0])
+        names = [main_columns(not_separated)[0]]  # the headline velocity of these walkers
+        counts = _counts_of_outcomes(finished, not_separated, names[0])
     else:
         names = [name for name in MAIN_NUMBERS if name in table]
         counts = {}
@@ -290,9 +294,10 @@ def spread_in(
     bands = {}
     depends = {}
     for name in names:
-        if whole[name].notna().any():
-            bands[name] = _band_of(whole[name])
-        depends[name] = rank_correlations(whole, name, keys) or {}
+        if not_separated[name].notna().any():
+            bands[name] = _band_of(not_separated[name])
+        # Without entries if the draws are too few, or nothing correlates significantly.
+        depends[name] = rank_correlations(not_separated, name, keys) or {}
     return Spread(
         directory=directory,
         varied=tuple(varied),
@@ -305,7 +310,7 @@ def spread_in(
 
 
 def _counts_of_outcomes(
-    finished: pd.DataFrame, whole: pd.DataFrame, velocity: str
+    finished: pd.DataFrame, not_separated: pd.DataFrame, velocity: str
 ) -> dict[str, int]:
     """Numbers of draws by what their walkers do.
 
@@ -313,17 +318,17 @@ def _counts_of_outcomes(
     ----------
     finished
         Rows of all finished draws.
-    whole
+    not_separated
         Those of draws whose walkers did not come apart.
     velocity
         The column of the velocity.
     """
-    speeds = whole[velocity]
+    speeds = not_separated[velocity]
     return {
         "forward": int((speeds > REST).sum()),
         "backward": int((speeds < -REST).sum()),
         "at_rest": int((speeds.abs() <= REST).sum()),
-        "separated": len(finished) - len(whole),
+        "separated": len(finished) - len(not_separated),
     }
 
 
@@ -337,9 +342,10 @@ def _band_of(numbers: pd.Series) -> dict[str, float]:
 
 
 def figures_of_spread(run: Path) -> dict[str, Figure]:
-    """The figure of the spread of a run, for its report.
+    """The figure of the spread of a run, for its report, by the name ``spread``.
 
-    The mapping is empty if the run has no spread, or no draw is finished.
+    The mapping is empty if the run has no spread, no draw is finished, or the record of the spread
+    cannot be read.
     """
     directory = spread_of(run.resolve())
     if not (directory / SPREAD_NAME).is_file():
@@ -351,7 +357,10 @@ def figures_of_spread(run: Path) -> dict[str, Figure]:
 
 
 def spread_text(spread: Spread) -> str:
-    """A spread in a few lines: mm, mm/s."""
+    """A spread as lines of text.
+
+    Bands are in displayed units, such as mm/s; drawn values are as the case file writes them.
+    """
     points = 0
     for band in spread.bands.values():
         points = max(points, int(band["points"]))
