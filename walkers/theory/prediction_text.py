@@ -45,8 +45,8 @@ def prediction_text(prediction: Mapping[str, Any], result: Mapping[str, Any] | N
     ]
     notes = [
         ["contacts", _contacts_text(prediction["detachment"])],
-        ["alignment", _rolling_text(prediction["alignment"])],
-        ["with slip", _slipping_text(prediction["alignment"])],
+        ["alignment", _alignment_if_rolling_text(prediction["alignment"])],
+        ["with slip", _alignment_if_slipping_text(prediction["alignment"])],
     ]
     lines.append(aligned(rows, right=range(1, 6)))
     lines.append(aligned(notes))
@@ -94,11 +94,17 @@ def _contacts_text(opening: Mapping[str, Any]) -> str:
     return f"{closed}, the strongest drive tried"
 
 
-def _rolling_text(alignment: Mapping[str, Any]) -> str:
-    """What small angles to the axis do according to the Mathieu equation, for beads that roll."""
+def _alignment_if_rolling_text(alignment: Mapping[str, Any]) -> str:
+    """What small angles ψ to the axis do if the beads roll without sliding.
+
+    They obey the Mathieu equation of `walkers.theory.mathieu`, with ϑ = πft and dimensionless
+    U (a steady acceleration), V (the drive) and β (damping by the bridges):
+
+        d²ψ/dϑ² + 2β dψ/dϑ + (U - 4V cos 2ϑ) ψ = 0
+    """
     u, v = alignment["u"], alignment["v"]
     equation = f"Mathieu U = {u:.3g}, V = {v:.3g}, β = {alignment['damping']:.3g}"
-    if not u:
+    if not u:  # on a level substrate, a single number tells where angles are stable
         equation += f" (stable for V < {alignment['largest_stable_v']:.3g})"
     if not u and not v:
         outcome = "no torque toward the axis"
@@ -109,8 +115,12 @@ def _rolling_text(alignment: Mapping[str, Any]) -> str:
     return f"{equation}: {outcome} if the beads roll"
 
 
-def _slipping_text(alignment: Mapping[str, Any]) -> str:
-    """What small angles to the axis do if contacts slip and beads spin."""
+def _alignment_if_slipping_text(alignment: Mapping[str, Any]) -> str:
+    """What small angles to the axis do if contacts slip and beads spin.
+
+    Angles grow or decay exponentially, at the ``rate`` of
+    `walkers.theory.prediction.alignment_of`, 1/s.
+    """
     rate = alignment["rate"]
     if rate is None:
         return "unknown: the axial motion is not periodic"
