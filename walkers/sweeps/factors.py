@@ -195,16 +195,19 @@ def _keys_of(factors: Sequence[Factor]) -> tuple[str, ...]:
 
 
 def readable_key(key: str) -> str:
-    """A dotted key or a column as words: ``friction bead wall``, ``liquid``.
+    """A dotted key, or a column of results, as words for a reader.
 
-    A column of results is called by the label of its numbers.
+    ``contact.friction.bead_wall`` becomes ``friction bead wall``, and ``liquid.name`` becomes
+    ``liquid``. A column of results becomes its declared label
+    (`walkers.postprocess.measure.quantities.declared`), and so does a key whose name without the
+    table is that of a column, such as ``drive.frequency``.
     """
-    table, _, name = key.partition(".")
-    column = name or table
-    if is_declared(column):
-        return declared(column).label
-    words = column
-    if name in ("name", "material"):  # "liquid" says more than "name"
+    table, _, name_in_table = key.partition(".")
+    name = name_in_table or table
+    if is_declared(name):
+        return declared(name).label
+    words = name
+    if name_in_table in ("name", "material"):  # the table says more, without an index: walkers[0]
         words, _, _ = table.partition("[")
     return words.replace(".", " ").replace("_", " ")
 

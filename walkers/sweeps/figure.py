@@ -189,7 +189,7 @@ def _draw(content: _Content, log: str) -> Figure:
     scale_y(grid[0, 0], points, list(models.values()), log)
     band = ""
     if "low" in points:
-        band = f"{_BAND}, 5 to 95 % of {_draws(finished, column)}"
+        band = f"{_BAND}, 5 to 95 % of {_number_of_draws_text(finished, column)}"
     draw_legend(figure, colours, list(models), down="down" in points, band=band)
     _draw_title(figure, [finished.attrs["title"], remark, *_remarks(finished, points, band)])
     return figure
@@ -306,10 +306,12 @@ def _label_panels(grid: npt.NDArray[Any], panels: Sequence[_Panel], label: str) 
         letter_panels(drawn)
 
 
-def _draws(finished: pd.DataFrame, column: str) -> str:
-    """How many draws the spreads at the points have, in words (`draws_text`).
+def _number_of_draws_text(finished: pd.DataFrame, column: str) -> str:
+    """How many draws the bands of a column rest on, such as ``30 to 32 draws`` (`draws_text`).
 
-    The numbers differ between points, such as ``30 to 32``, if draws failed or walkers came apart.
+    A draw is a run of a point with its uncertain values drawn from their ranges. The numbers differ
+    between points if draws failed or walkers came apart. Bands of few draws are approximate. At
+    least one point must have draws.
     """
     numbers = finished[f"{column}_draws"].dropna()
     draws = f"{numbers.min():.0f}"

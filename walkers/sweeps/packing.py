@@ -20,7 +20,10 @@ from walkers.runner.cost import pairs_of_beads, predicted_seconds
 from walkers.templates.placement import sharing_key
 
 MOST_WALKERS = 96
-"""Largest number of walkers of a deck; with 96, the cost of the deck itself is 4 % of the total."""
+"""Largest number of walkers of a deck, counted as pairs of beads (`pairs_of_beads`).
+
+With 96, the cost of the deck itself is 4 % of the total.
+"""
 MOST_POINTS = 64
 """Largest number of points of a deck."""
 LONGEST_SECONDS = 60.0
@@ -104,13 +107,16 @@ def seconds_of(decks: Iterable[PlannedDeck]) -> list[float]:
 def _split_group(
     group: Sequence[int], cases: Sequence[Case], longest_seconds: float
 ) -> list[PlannedDeck]:
-    """The smallest number of decks for points that can share a deck.
+    """Split points that can share a deck into as few decks as possible.
 
-    The limits of a deck do not apply to one of a single point.
+    A deck has at most `MOST_POINTS`, `MOST_WALKERS` and ``longest_seconds`` of predicted time, as
+    if each of its points had the walkers of the largest one. A deck of a single point has no
+    limits.
     """
     most_walkers = max(pairs_of_beads(cases[number]) for number in group)
 
     def is_possible(points: int) -> bool:
+        """Whether a deck may have so many points of the group."""
         walkers = points * most_walkers
         seconds = predicted_seconds(cases[group[0]], walkers)  # a group shares the number of steps
         is_small = points <= MOST_POINTS and walkers <= MOST_WALKERS

@@ -8,7 +8,8 @@ A site file has SLURM's settings, or in Python a ``parsl.Config`` for any other 
     jobs      = 4
 
 Parsl submits the jobs. A job is a pilot: it starts workers, and each worker runs one deck after
-another until none is left.
+another until none is left. The *interchange* is a process that Parsl starts beside the sweep: it
+passes decks and results between the sweep and the pilots.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ Ctrl-C must not end the interchange, because Parsl waits for its last message. I
 killed, the interchange must end, so that the pilots notice and end, too.
 """
 _MOST_LOSSES = 5
-"""Repetitions of a deck whose worker was lost (a cancelled job, a node that went down)."""
+"""How often a deck is repeated whose worker was lost (a cancelled job, a node that went down)."""
 _REFUSED_LETTER = re.compile(r"[^\w./+@=,:-]")
 """A letter that Parsl's shell scripts or SLURM's paths cannot have.
 
@@ -203,6 +204,9 @@ def decks_at(config: Config, ranks: int) -> int:
 def prepare(config: Config, folder: Path, ranks: int) -> Config:
     """Change the configuration of a site for the decks of a sweep, and return it.
 
+    Decks of lost workers are repeated, the interchange ends with the sweep and not with Ctrl-C, and
+    a node has as many workers as it has cores for their processes.
+
     Parameters
     ----------
     config
@@ -210,7 +214,8 @@ def prepare(config: Config, folder: Path, ranks: int) -> Config:
     folder
         Where Parsl writes its scripts and logs; the nodes must see this folder.
     ranks
-        Number of MPI processes of a deck.
+        Number of MPI processes of a deck, at most the number of cores of a node
+        (`walkers.sweeps.scheduler.SweepOptions.for_ranks` refuses more).
     """
     from parsl.executors import HighThroughputExecutor
 
@@ -224,15 +229,17 @@ def prepare(config: Config, folder: Path, ranks: int) -> Config:
             interchange = str(programs / "interchange.py")
             executor.interchange_launch_cmd = [*_GUARDED, interchange]
             executor.max_workers_per_node = executor.workers_per_node // ranks
+            # A job starts with the PATH of its node, on which Parsl's worker need not be.
             provider: Any = executor.provider
             provider.worker_init += f'\nexport PATH={quote(str(programs))}:"$PATH"\n'
     return config
 
 
 def _cost_of_failure(error: Exception, _: object) -> float:
-    """Share of the retries that a failure uses up.
+    """How many of the `_MOST_LOSSES` repetitions of a deck a failure uses up.
 
-    Parsl repeats a deck only if its worker was lost.
+    One if the worker was lost; more than there are for every other error, so that Parsl does not
+    repeat the deck.
     """
     from parsl.executors.high_throughput.errors import ManagerLost, WorkerLost
 

@@ -276,16 +276,17 @@ def seed_groups(frame: pd.DataFrame) -> Iterator[tuple[dict[str, Any], pd.DataFr
     rows : pandas.DataFrame
         The rows of the group.
     """
-    keys = []
+    columns = []
     for name in frame.attrs["varied"]:
         differs = frame[name].nunique(dropna=False) > 1
         if differs and name not in SEEDS:
-            keys.append(name)
-    if not keys:
+            columns.append(name)
+    if not columns:
         yield {}, frame
         return
-    for values, rows in frame.groupby(keys, sort=False, dropna=False):
-        yield dict(zip(keys, values, strict=True)), frame.loc[rows.index]
+    for values, rows in frame.groupby(columns, sort=False, dropna=False):
+        # Rows of the table itself have its `attrs`; pandas does not promise them for groups.
+        yield dict(zip(columns, values, strict=True)), frame.loc[rows.index]
 
 
 def walking_points(frame: pd.DataFrame) -> pd.DataFrame:
@@ -629,7 +630,12 @@ def _threshold(points: pd.DataFrame, lowered: str, until_below: float) -> dict[s
 
 
 def describe_status(frame: pd.DataFrame) -> str:
-    """Numbers of points by status, failures with their messages, and the thresholds of descents."""
+    """The state of a sweep as lines of text.
+
+    They are the numbers of points by status; the messages of failed points, of the first
+    `_MOST_FAILURES` alone; how much is done of each interrupted point, which has the status
+    ``missing`` and a message; and the thresholds of descents.
+    """
     statuses = status_text(Counter(frame["status"])) or "none"
     lines = [f"{frame.attrs['sweep']}: {counted(len(frame), 'point')}, {statuses}"]
     failed = frame[frame["status"] == "failed"]
