@@ -89,7 +89,7 @@ def crosscheck(  # noqa: PLR0913 (keyword-only, and described below)
     without
         Terms that the second engine leaves out, see `walkers.second_engine.engine.TERMS`.
     seeds
-        Number of runs with different random starts, for piles.
+        Number of runs with different random starts, at least 1; more than one for piles.
     progress, engine
         As for `walkers.run`.
 
@@ -106,8 +106,8 @@ def crosscheck(  # noqa: PLR0913 (keyword-only, and described below)
     motions = []
     for number in range(seeds):
         changes = {"run.seed": case.run.seed + number} if number else {}
-        start = changed_case(case, changes)
-        motions.append(run(start, out, progress=progress, engine=engine).motion)
+        case_of_seed = changed_case(case, changes)
+        motions.append(run(case_of_seed, out, progress=progress, engine=engine).motion)
     return compare_motions(motions, without)
 
 

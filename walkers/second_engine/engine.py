@@ -154,7 +154,8 @@ def _constants(
 ) -> Constants:
     """The constants of a case for beads between walls, in SI units.
 
-    ``strengths`` are factors of `TERMS`: 1, or 0 for terms that are left out.
+    ``radius`` has the shape (N,), in m. ``strengths`` are factors of `TERMS`: 1, or 0 for terms
+    that are left out. `InputError` if a wall is a facet of a mesh.
     """
     contact = case.contact
     youngs_modulus = contact.youngs_modulus
@@ -181,10 +182,12 @@ def _constants(
         # Effective moduli of two bodies of the same material.
         modulus=youngs_modulus / (2.0 * (1.0 - poissons_ratio**2)),
         shear_modulus=youngs_modulus / (4.0 * (1.0 + poissons_ratio) * (2.0 - poissons_ratio)),
+        # β of Tsuji's damping as LIGGGHTS has it, from the coefficient of restitution.
         damping=-log_restitution / sqrt(log_restitution**2 + pi**2) * strengths["damping"],
         friction_beads=contact.friction.bead_bead * strengths["friction"],
         friction_walls=contact.friction.bead_wall * strengths["friction"],
         rolling=contact.rolling_friction * strengths["rolling-friction"],
+        # Beads closer than the sum of both search radii are neighbours.
         search_radius=radius + (longest_bridge + skin) / 2.0,
         skin=skin,
         bridges=bridges,
@@ -222,7 +225,10 @@ def _drive(case: Case) -> tuple[FloatArray, FloatArray]:
 
 
 def _bridges(case: Case, radius: FloatArray, strengths: Mapping[str, float]) -> BridgeSplines:
-    """Bridges between all sizes of beads and between beads and walls."""
+    """Bridges between all sizes of beads and between beads and walls.
+
+    The strengths of the terms ``capillary`` and ``lubrication`` act here.
+    """
     sizes, size_of_bead = np.unique(radius, return_inverse=True)
     count = len(sizes)
     other_radii = [*sizes.tolist(), inf]

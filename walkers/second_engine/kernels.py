@@ -519,7 +519,11 @@ def add_to_films(  # noqa: PLR0913, PLR0917 (a kernel, whose arguments are numbe
 
 @compiled
 def list_neighbours(constants: Constants, state: State) -> None:
-    """List the beads that are near each other."""
+    """List the pairs of beads that are closer than the sum of their search radii.
+
+    Changes ``neighbours`` of the state above its diagonal (i < j), and remembers the present
+    positions as ``listed_position``.
+    """
     state.listed_position[:] = state.position
     beads = constants.radius.shape[0]
     for i in range(beads):

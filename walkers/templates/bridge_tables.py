@@ -189,16 +189,17 @@ def _error(table: BridgeTable) -> tuple[float, float]:
 def bridge_tables(
     surfaces: Sequence[Surface], sizes: Collection[tuple[int, float]], law: BridgeLaw | None = None
 ) -> str:
-    """The bridge tables of a deck: one for every two surfaces that may meet.
+    """The bridge tables of a deck: for every two surfaces that may meet, one for each volume.
 
-    Beads of different types never meet.
+    A bridge has a single volume unless liquid is conserved. Beads of different atom types never
+    meet: they belong to walkers of different cases, which stand apart in a shared deck.
 
     Parameters
     ----------
     surfaces
         Contact parameters and liquid of each atom type of beads.
     sizes
-        Atom type (from 1) and radius (m) of the beads.
+        The different atom types (from 1) and radii (m) of the beads.
     law
         The law of all bridges; None: that of each liquid.
 
@@ -219,9 +220,9 @@ def bridge_tables(
     wall_type = len(surfaces) + 1
     for bead_type, surface in enumerate(surfaces, 1):
         radii = sorted(radius for atom_type, radius in sizes if atom_type == bead_type)
-        for place, radius in enumerate(radii):
+        for number, radius in enumerate(radii):
             parts += _tables_of_pair(surface, (bead_type, wall_type), (radius, inf), law)
-            for other_radius in radii[place:]:
+            for other_radius in radii[number:]:
                 types = (bead_type, bead_type)
                 parts += _tables_of_pair(surface, types, (radius, other_radius), law)
     return "".join(parts)

@@ -166,14 +166,20 @@ def material_parameters(
     *,
     with_density: bool,
 ) -> list[DeckParameter]:
-    """Gravity and the materials, as far as they are the same for all beads.
+    """Gravity, and the properties of materials that have a single value in the deck.
+
+    Young's modulus is a parameter if all beads and the walls have the same; restitution and
+    friction, if all beads have the same surface; the viscosity, if the deck can be rescaled for
+    another one. Poisson's ratio always is: cases with different ones do not share a deck
+    (`walkers.templates.placement.sharing_key`).
 
     Parameters
     ----------
     case
-        The case of the deck.
+        The case of the deck, whose contact parameters are also those of the walls; of a shared
+        deck, its first case.
     contacts
-        Contact parameters of the surfaces of its beads.
+        Contact parameters of the different surfaces of the beads.
     scalable_liquid
         The liquid, if the resistances of its bridges are proportional to its viscosity; else None.
     with_density

@@ -156,6 +156,8 @@ def predict_motion(  # noqa: PLR0913
 ) -> PredictedMotion:
     """Integrate the motion of N walkers from rest on a substrate with the acceleration a0 cos 2πft.
 
+    Arguments with different N must broadcast.
+
     Parameters
     ----------
     walker
@@ -166,22 +168,32 @@ def predict_motion(  # noqa: PLR0913
         a0 in m/s², a number or an array of shape (N,).
     steady_acceleration
         A steady acceleration along the axis toward the small bead, m/s², a number or an array of
-        shape (N,): the weight of a walker that climbs with its large bead above.
+        shape (N,): gravity, for a walker that climbs with its large bead above.
     cycles
         Largest number of cycles; the integration ends earlier if the motion is periodic.
     steps_per_cycle
         Number of time steps per cycle.
     effect
         A further force law: a function compiled by numba, and its K parameters for each walker,
-        shape (N, K). The function takes the sliding velocities of the contacts (m/s), their normal
-        forces (unit 4πγR̄), their μ at the start of each stage of a step, and the parameters of a
-        walker. It returns μ, f and Hᵀm in that unit; f and Hᵀm add to the forces of the bridges.
-        All are constant through the stage, so that a stiff law needs more steps.
+        shape (N, K). A step consists of two implicit Euler stages
+        (`walkers.theory.stepping.STAGE`), and at the start of each the function is called for a
+        walker with four arguments: the sliding velocities of its contacts (m/s), their normal
+        forces (in 4πγR̄), their coefficients μ, three numbers each; and its parameters, shape (K,).
+        It returns three arrays of shape (3,): μ, and f and Hᵀm (in 4πγR̄), which add to the forces
+        of the bridges. They are constant through the stage, so that a stiff law needs more steps.
 
     Returns
     -------
     PredictedMotion
-        The means over the last cycle.
+        The means over the last cycle; over the second half of all cycles if the motion is not
+        periodic. The velocity is NaN if a contact opened, or if the forces have no solution.
+
+    Raises
+    ------
+    ExtraMissing
+        If the packages of the extra ``theory`` are not installed.
+    ValueError
+        If the shapes of the arguments do not broadcast.
     """
     require("theory")
     from walkers.theory.stepping import integrate

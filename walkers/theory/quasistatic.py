@@ -1,9 +1,9 @@
 """The paper's model: a dimer in contact under friction linear in the sliding velocity.
 
-Symbols as in Khan et al., *Self-assembled granular walkers*: bead 1 is the large ones, sin δ = (R1
-- R2)/(R1 + R2) and μ = (m1 - m2)/M. Contacts 1 and 2 are the beads on the substrate, 3 is bead on
-bead; x points from bead 2 to bead 1. Forces are in units of 4πγR̄, in which the force of the drive
-is Γ0.
+Symbols as in Khan et al., *Self-assembled granular walkers*: bead 1 is the large one, sin δ =
+(R1 - R2)/(R1 + R2), between -1 and 1, and μ = (m1 - m2)/M, so that m1/M = (1 + μ)/2. Contacts 1 and
+2 are the beads on the substrate, 3 is bead on bead; x points from bead 2 to bead 1. Forces are in
+units of 4πγR̄, in which the force of the drive, M a0, is Γ0.
 """
 
 from __future__ import annotations
@@ -28,14 +28,15 @@ def mass_asymmetry(sin_delta: npt.ArrayLike) -> FloatArray:
 
 
 def normal_force_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
-    """The matrix D of F = F0 + D F∥ (Eq. 2 of the paper), shape (…, 3, 3).
+    """The matrix D of F = F0 + D F∥ (Eq. 2 of the paper), dimensionless, shape (…, 3, 3).
 
-    It follows from the balance of forces on beads at fixed distances.
+    It follows from the balance of forces on beads at fixed distances, and is infinite at
+    sin δ = ±1.
     """
     s = np.asarray(sin_delta, np.float64)
     mu = mass_asymmetry(s)
     ones = np.ones_like(s)
-    first_share = (1.0 + mu) / 2.0
+    first_share = (1.0 + mu) / 2.0  # m1/M
     second_share = (1.0 - mu) / 2.0
     rows = [
         [-second_share * s, first_share * s, -ones],
