@@ -845,16 +845,19 @@ class Sweep:
         hue
             Key or column that sets the colour, or ``none``; default: the first key that is not x.
         panels
-            Key or column that sets the panel, or ``none`` to draw all values of further keys alike.
+            Key or column that sets the panel, or ``none`` to draw all values of further keys alike;
+            default: no panels, except one for each key of a sample.
         log
-            Which axes are logarithmic: ``x``, ``y`` or ``xy``.
+            Which axes are logarithmic: ``x``, ``y`` or ``xy``. An x axis of a key that is drawn
+            log-uniformly always is.
         theory
             Also draw the predictions of the theory.
 
         Returns
         -------
         matplotlib.figure.Figure
-            The figure, which can be changed and saved.
+            The figure, which can be changed and saved. Its axes are in the units of the sweep file
+            for keys, and in mm, mm/s, nJ and degrees for results.
 
         Raises
         ------
@@ -1112,8 +1115,10 @@ def climb(
 ) -> list[dict[str, Any]]:
     """Measure probability, rate and speed of climbs in piles, with confidence intervals.
 
-    Runs of a sweep that differ in nothing but their seed are a condition; a run by itself is
-    another one. Unfinished points of a sweep are left out, with a warning.
+    A climb is the rise of a cluster of beads, free of the pile, along a wall
+    (`walkers.postprocess.measure.clusters`). Runs of a sweep that differ in nothing but their seed
+    are a condition; a run by itself is another one. Unfinished points of a sweep are left out, with
+    a warning.
 
     Parameters
     ----------
@@ -1124,8 +1129,9 @@ def climb(
     changes
         Other values of the cases, by dotted keys.
     within
-        Count climbs up to this time of the drive, s; None: the end of the shortest run without a
-        climb.
+        Count climbs up to this time of the drive, s. None: count all climbs; the probability is
+        then that of a climb before the end of the shortest run without one, or before the end of
+        the longest run if all runs have climbs.
     to
         Also write the figure (.png, .svg, .pdf) or the table (.csv) to this file.
 
@@ -1138,7 +1144,7 @@ def climb(
     Raises
     ------
     InputError
-        If a reference does not exist, a run is none of a pile, or the file has another format.
+        If a reference does not exist, a run is not one of a pile, or the file has another format.
     """
     if to is not None:
         check_place(Path(to), *(f".{form}" for form in FORMATS), ".csv")
@@ -1159,7 +1165,12 @@ def climb(
 
 
 def _conditions(run_or_sweep: Run | Sweep) -> Iterator[tuple[str, list[Results]]]:
-    """The conditions of a sweep with the results of their runs; a run is one condition."""
+    """The conditions of a sweep, with the results of their runs; a run is one condition.
+
+    The label of a condition names its varied values. It is empty for a run, and for the condition
+    of a sweep whose values at least half of the conditions have
+    (`walkers.sweeps.climbing.conditions_in`).
+    """
     directory = run_or_sweep.directory
     if isinstance(run_or_sweep, Run):
         yield "", [read_results(directory)]

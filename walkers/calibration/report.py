@@ -121,10 +121,29 @@ def _rounded(value: float) -> float:
 def calibration_record(outcome: Outcome) -> dict[str, Any]:
     """The contents of ``calibration.json``.
 
-    Observations are in mm/s and degrees, parameters in their units. ``posterior`` and ``prior``
-    have 5 %, median and 95 % of each parameter. ``posterior`` also has ratios of parameters, such
-    as ``second/first``, that set the same keys in different experiments: where a ratio of 1 is
-    likely, one value would do.
+    Observations are in mm/s and degrees, parameters in their units. A *set* is a value of each
+    parameter.
+
+    Returns
+    -------
+    dict
+        By name, in plain JSON types:
+
+        - ``calibration``, ``title``: its name and title
+        - ``observed``: ``published`` or ``measured``, what the facts are
+        - ``settings``: the contents of the calibration file
+        - ``labels``: the label of each parameter
+        - ``number``: number of sets to which the emulators are fitted
+        - ``sets``: the sets of the file and those that the calibration proposes, by their names
+        - ``agree``: for each of these sets, how many facts the engine's numbers agree with
+        - ``of``: the number of these facts, without those that are derived from others
+        - ``posterior``, ``prior``: 5 %, median and 95 % of each parameter. ``posterior`` also has
+          ratios of parameters, such as ``second/first``, that set the same keys in different
+          experiments: where a ratio of 1 is likely, one value would do
+        - ``effective_samples``: effective number of samples of the posterior from all facts, then
+          of that without the facts that are held out
+        - ``observations``: for each fact, the engine's number at each set, whether they agree, and
+          the prediction if it was held out; None for numbers that do not exist
     """
     calibration = outcome.calibration
     file = calibration.file
@@ -134,7 +153,8 @@ def calibration_record(outcome: Outcome) -> dict[str, Any]:
     independent_rows = [row for row in rows if not row["derived"]]
     agree = {}
     for name in outcome.sets:
-        agree[name] = sum(row["agrees"][name] for row in independent_rows)
+        agreements = [row["agrees"][name] for row in independent_rows]
+        agree[name] = agreements.count(True)
     posterior = {}
     for name, samples in _posterior_samples(outcome).items():
         posterior[name] = np.quantile(samples, interval).tolist()

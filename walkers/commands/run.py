@@ -269,7 +269,11 @@ def sweep(
 def _print_plan(
     sweep: SweepDefinition, out: Path, options: SweepOptions, engine: str | None, draws: int | None
 ) -> None:
-    """Print what a sweep would run, and with ``draws`` the cost of a spread of each point."""
+    """Print what a sweep would run, and predict its cost.
+
+    With ``draws``, also print the cost of the spread of each point: so many runs of the point with
+    its uncertain values drawn from their ranges. None: no spread is asked for.
+    """
     from walkers.sweeps.scheduler import plan_sweep
     from walkers.sweeps.spread import spread_sweep
 
@@ -281,7 +285,7 @@ def _print_plan(
     seconds = 0.0
     missing = 0
     for case in sweep.cases():
-        plan = plan_sweep(spread_sweep(case, draws, engine), out, options, engine)
-        seconds += plan.core_seconds
-        missing += len(plan.missing)
+        plan_of_spread = plan_sweep(spread_sweep(case, draws, engine), out, options, engine)
+        seconds += plan_of_spread.core_seconds
+        missing += len(plan_of_spread.missing)
     print(f"  spread     {missing} more runs, predicted {seconds:.0f} core-seconds")

@@ -1,7 +1,8 @@
 """Audits of an engine: their outcomes in the user's cache, and what they decide about runs.
 
-An audit is valid for one binary and one build of the contact model. `walkers.second_engine.audit`
-makes it.
+An audit compares the forces and motions of a few beads, as the engine computes them, with the
+expected ones. It is valid for one binary and one build of the contact model.
+`walkers.second_engine.audit` makes it.
 """
 
 from __future__ import annotations

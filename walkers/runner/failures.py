@@ -19,7 +19,11 @@ Every point; all at first, until a point is finished; one point; or empty if thi
 """
 
 AUDITED_VERSION = "LIGGGHTS-PUBLIC 3.8.0"
-"""The audited version of the engine, for which the contact model is written."""
+"""The version of the engine for which the contact model is written, as its banner prints it.
+
+It is the only version that is audited: ``walkers check engine`` compares its forces on a few beads
+with the expected ones.
+"""
 
 
 class EngineFailure(WalkersError):

@@ -468,7 +468,19 @@ class _Watch:
     # --- judging ----------------------------------------------------------------------------------
 
     def check(self) -> None:
-        """Raise the failure that shows while the engine runs, if there is one."""
+        """Raise the failure that shows while the engine runs, if there is one.
+
+        Raises
+        ------
+        OtherEngine
+            If the engine has printed another version than the audited one.
+        BlowUp, BeadsLost
+            If a status line has shown it.
+        LogTooLong, EngineSilent, TimeLimitExceeded
+            If the log or a time exceeds its limit.
+        DiskFull
+            If the dump is not complete, and the disk has no space left but the reserve.
+        """
         deck = self.deck
         progress = f"step {self.step} of {self.layout.steps}"
         if self.version is not None and self.version != AUDITED_VERSION:
@@ -488,6 +500,8 @@ class _Watch:
             raise failures.TimeLimitExceeded(message, self.directory)
         missing = self.layout.bead_dump_bytes - self.dump_bytes
         free = shutil.disk_usage(self.directory).free
+        # The engine does not report a full disk. At the start, the disk had space for the whole
+        # dump; if it has less now, other programs may still make space before it is needed.
         if missing > 0 and free < _SPARE_BYTES:
             raise failures.DiskFull(missing, free, self.directory)
 

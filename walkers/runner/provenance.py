@@ -48,7 +48,10 @@ def software() -> dict[str, Any]:
 
 
 def _versions_of(requirements: list[str]) -> dict[str, str]:
-    """Versions of the packages of requirements that are installed, without those of extras."""
+    """Versions of the packages that requirements name, such as ``numpy>=2``, by their names.
+
+    Requirements of extras and packages that are not installed are left out.
+    """
     versions = {}
     for requirement in requirements:
         if "extra ==" in requirement:

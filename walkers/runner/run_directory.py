@@ -512,8 +512,10 @@ def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
 def recomputed(directory: Path, names: Collection[str]) -> Iterator[None]:
     """Record in the manifest of a finished run that a ``with`` block recomputes files.
 
-    It records program, time and checksums. During the block the run is locked, and the manifest
-    does not list the files, so that a kill gives no false alarm.
+    During the block, the run is locked, and the manifest has no checksums of the files: if the
+    process is killed, or the block raises an error, half-written files are not reported as damaged.
+    After the block, the manifest has their checksums and sizes, and under ``tabulated`` the program
+    and the time.
 
     Parameters
     ----------
@@ -535,7 +537,7 @@ def recomputed(directory: Path, names: Collection[str]) -> Iterator[None]:
         if not descriptors:
             raise RunBusy("another process is measuring this run", directory)
         contents = read_manifest(directory)
-        sums = sums_of(contents, directory)
+        sums = sums_of(contents, directory)  # a part of the contents, which changes with them
         removed = [sums.pop(name, None) for name in names]
         if any(removed):
             write_json(directory / MANIFEST_NAME, contents)

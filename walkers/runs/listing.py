@@ -100,6 +100,9 @@ class ListEntry:
 def runs_in(out: Path) -> list[ListEntry]:
     """The runs in a folder, finished or not, sorted by name.
 
+    Of two runs with the same name, the finished one comes first. Runs in progress without a
+    directory, such as those in a shared deck, are among them.
+
     Raises
     ------
     InputError
@@ -124,7 +127,10 @@ def folders_in(out: Path) -> list[Path]:
 
 
 def place_of(directory: Path) -> Path:
-    """The final directory of a run, beside which its lock is."""
+    """The final directory of a run, for the directory in which it is now.
+
+    That may have the ending of an unfinished or of a replaced run, which the final name lacks.
+    """
     name = directory.name.removesuffix(run_directory.UNFINISHED)
     return directory.with_name(name.removesuffix(run_directory.REPLACED))
 
@@ -150,19 +156,25 @@ def _without_directory(out: Path, listed: set[Path]) -> list[ListEntry]:
 
 
 def entry_of(path: Path) -> ListEntry | None:
-    """The run in a directory; None if the directory is a user's own."""
+    """The run in a directory; None if the directory is none that this program has made.
+
+    The directory must have a manifest or the name of a run. If its case cannot be read, it must
+    have the name of a run, and either a manifest, or the ending of the name of an unfinished run
+    and the files of one (`walkers.runner.run_directory.holds_unfinished`).
+    """
     place = place_of(path)
-    finished = place == path and run_directory.is_finished(path)
-    is_run_name = run_directory.is_run_name(place.name)
-    if not finished and not is_run_name:
+    has_final_name = path == place
+    finished = has_final_name and run_directory.is_finished(path)
+    has_run_name = run_directory.is_run_name(place.name)
+    if not finished and not has_run_name:
         return None
     case = _case_in(path)
     if case is not None:
         case_name = case.name
         parameters = flattened(case)
     else:
-        holds_run = finished or (place != path and run_directory.holds_unfinished(path))
-        if not is_run_name or not holds_run:
+        is_unfinished = not has_final_name and run_directory.holds_unfinished(path)
+        if not has_run_name or not (finished or is_unfinished):
             return None
         case_name = _case_name_of(place)
         parameters = FlatCase()

@@ -24,6 +24,8 @@ from walkers.runner.cost import PROGRAM_SECONDS, predicted_overhead, predicted_s
 from walkers.runner.process import cores_here
 from walkers.text import aligned, printable
 
+_BOX_HEIGHT = 2.0
+"""Height of the simulation box over the height of the container (``boundary.height``) in it."""
 _LOOSE_PACKING = 0.55
 """Share of the volume of a container that loosely packed beads fill."""
 _FASTEST_CLIMB = 12e-3
@@ -75,7 +77,11 @@ def _time_step_notes(case: Case) -> list[str]:
 
 
 def _pile_notes(case: Case) -> list[str]:
-    """Notes on a pile of beads of a single size, and on climbers that may rise over the walls."""
+    """Notes on a pile of beads of a single size, and on climbers that may leave the box at its top.
+
+    Climbers may leave it if the mean speed from the top of the loosely packed pile to that of the
+    box, within the run, is below that of the fastest climb.
+    """
     lines = []
     counts = {"large": case.large, "small": case.count - case.large}
     for size, count in counts.items():
@@ -83,8 +89,8 @@ def _pile_notes(case: Case) -> list[str]:
             lines.append(f"no {size} beads; in the paper, large beads lead small ones")
     cross_section = case.boundary.geometry.cross_section
     pile_height = _volume(case) / (_LOOSE_PACKING * cross_section)
-    free_height = 2.0 * case.boundary.inner_height - pile_height
-    if not case.run.until:
+    free_height = _BOX_HEIGHT * case.boundary.inner_height - pile_height
+    if not case.run.until:  # a run until a climb ends before a climber reaches the top
         speed = free_height / case.duration
         if speed < _FASTEST_CLIMB:
             end = "rise above twice boundary.height, and end the run early"
