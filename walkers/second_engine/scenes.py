@@ -123,6 +123,8 @@ _BARE_CASE = {
     "run": {"time_step": "1 us", "samples_per_cycle": 1},
     "environment": {"gravity": "0 m/s^2"},
 }
+"""A case in which only elastic contacts and capillary forces act: no friction, damping, viscosity,
+gravity or drive."""
 _FULL = {
     "contact.friction.bead_bead": 0.23,
     "contact.friction.bead_wall": 0.31,
@@ -133,11 +135,13 @@ _FULL = {
 }
 """Changes of the bare case: friction, rolling friction, damping and the law of this module."""
 _WEIGHT = {"environment.gravity": "9.81 m/s^2"}
+"""Changes of a case whose beads have weight."""
 _FAST_DRIVE = {
     "drive.frequency": "300 Hz",
     "drive.peak_acceleration": "8 g",
     "drive.frame": "lab",
 }
+"""Changes of a case whose walls oscillate fast, in the frame of the laboratory."""
 
 
 def bench_case(changes: Mapping[str, Any]) -> Case:
@@ -442,20 +446,20 @@ class Setting:
         Walls of the scene.
     changes
         Changes of `full_case`, by dotted key.
-    freely
+    free_steps
         Number of steps in which the beads move freely; 0 if their motion is prescribed.
     """
 
     beads: Sequence[Bead]
     walls: Sequence[Wall] = (BOTTOM,)
     changes: Mapping[str, Any] = field(default_factory=dict)
-    freely: int = 0
+    free_steps: int = 0
 
     def lines(self, name: str, bench: Bench) -> Iterator[Line]:
         """Run the scene in both engines and compare; ``name`` is that of the scene."""
         case = full_case(self.changes)
         scene = scene_of(self.beads, self.walls)
-        if self.freely:
+        if self.free_steps:
             errors = self._errors_of_motion(case, scene, bench)
         else:
             errors = _errors_of_forces(case, scene, bench)
@@ -464,16 +468,16 @@ class Setting:
 
     def _errors_of_motion(self, case: Case, scene: PlacedBodies, bench: Bench) -> dict[str, float]:
         """Relative errors of displacement and spin of beads that move freely for some steps."""
-        steps_per_frame = self.freely // _FREE_FRAMES
-        output = bench.run(recorded_plan(case, scene, self.freely, steps_per_frame))
+        steps_per_frame = self.free_steps // _FREE_FRAMES
+        output = bench.run(recorded_plan(case, scene, self.free_steps, steps_per_frame))
         start = output.frames[0, :, :3]
-        of_liggghts = output.frames[1:]
-        of_second_engine = second_engine(case, scene).run(self.freely, steps_per_frame)
-        displacement = of_liggghts[:, :, :3] - start
-        second_displacement = of_second_engine[..., :3] - start
+        frames_of_liggghts = output.frames[1:]
+        frames_of_second_engine = second_engine(case, scene).run(self.free_steps, steps_per_frame)
+        displacement = frames_of_liggghts[:, :, :3] - start
+        second_displacement = frames_of_second_engine[..., :3] - start
         return {
             "displacement": relative_error(displacement, second_displacement),
-            "spin": relative_error(of_liggghts[:, :, 6:], of_second_engine[..., 6:]),
+            "spin": relative_error(frames_of_liggghts[:, :, 6:], frames_of_second_engine[..., 6:]),
         }
 
 
@@ -606,7 +610,7 @@ SCENES: dict[str, Setting] = {
             Bead(0, (0.0, 0.0, 5e-3), LARGE_RADIUS, (0.1, 0.2, 0.0), (1.0, 2.0, 3.0)),
         ],
         changes={**_WEIGHT, "drive.peak_acceleration": "4 g"},
-        freely=6000,
+        free_steps=6000,
     ),
 }
 """Scenes by name: with prescribed motion, and of beads that move freely."""
