@@ -63,7 +63,7 @@ class Outcome:
     numbers
         Observations of the engine at these sets, shape (K,), in SI units, angles in degrees; NaN
         where a number does not exist.
-    number
+    number_of_fitted_sets
         Number of sets to which the emulators are fitted.
     emulators
         Emulators of all but costly observations, by the names of the observations.
@@ -78,7 +78,7 @@ class Outcome:
     calibration: Calibration
     sets: Mapping[str, FloatArray]
     numbers: Mapping[str, FloatArray]
-    number: int
+    number_of_fitted_sets: int
     emulators: Mapping[str, Emulator]
     posterior: Posterior
     held_out: Posterior
@@ -219,7 +219,7 @@ def calibrate(
         calibration=calibration,
         sets=dict(zip(names, sets, strict=True)),
         numbers=dict(zip(names, numbers_of_sets, strict=True)),
-        number=len(points),
+        number_of_fitted_sets=len(points),
         emulators=emulators,
         posterior=posterior,
         held_out=held_out,
@@ -278,7 +278,7 @@ def nearest(observations: Sequence[Observation], numbers: FloatArray) -> int:
     observations
         The K facts. Those without a weight in a calibration are not used.
     numbers : ndarray, shape (P, K)
-        Observations of the sets in SI units, angles in degrees; NaN where there is no number.
+        Observations of the sets in SI units, angles in degrees; NaN where a number does not exist.
 
     Returns
     -------

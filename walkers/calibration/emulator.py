@@ -111,6 +111,8 @@ class Emulator:
         from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
 
         learned = distances(observation, numbers)
+        # Start values and limits of the search: amplitude and noise of standardised distances, and
+        # lengths in the unit cube.
         amplitude = ConstantKernel(1.0, (1e-2, 1e2))
         smooth = Matern(np.ones(points.shape[1]), (5e-2, 2e1), nu=2.5)
         noise = WhiteKernel(1e-2, (1e-6, 1.0))

@@ -374,7 +374,10 @@ def _unknown_names(file: CalibrationFile) -> Iterator[Problem]:
 def _not_in(
     defined: Collection[str], names: Collection[str], place: str, kind: str
 ) -> Iterator[Problem]:
-    """A problem for each name at a place of the file that is not defined; ``kind`` is of what."""
+    """A problem for each name at a place of the file that the file does not define.
+
+    ``kind`` says what the names should be, such as ``a parameter``.
+    """
     for name in names:
         if name not in defined:
             defined_names = ", ".join(sorted(defined))

@@ -78,7 +78,7 @@ class Observation(ConfigTable):
     of
         Experiments whose mean is the number, or its numerator.
     over
-        Experiments whose mean is the denominator; empty: the number is no ratio.
+        Experiments whose mean is the denominator; empty: the number is not a ratio.
     value
         The number that was found; None if the fact gives limits.
     least, most

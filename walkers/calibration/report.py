@@ -173,7 +173,7 @@ def calibration_record(outcome: Outcome) -> dict[str, Any]:
         "observed": "published" if file.published else "measured",
         "settings": file.model_dump(mode="json"),
         "labels": labels,
-        "number": outcome.number,
+        "number": outcome.number_of_fitted_sets,
         "sets": sets,
         "agree": agree,
         "of": len(independent_rows),
