@@ -2,8 +2,8 @@
 
 It is compiled on first use and kept in the user's cache. It is compiled with the headers and the
 library of this machine, since its binary interface must match the installed package, and only for
-the engine version for which it was written. The engine executes it as the user: therefore nobody
-else but root may be able to write it, and its checksum is kept beside it.
+the engine version for which it was written. The engine executes it as the user: therefore only
+the user and root may be able to write it, and its checksum is kept beside it.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ g++ {options} -I. -isystem {_HEADERS} \\
 def _place() -> tuple[Path, str]:
     """Path of the compiled model, and SHA-256 of all from which it is compiled.
 
-    That is options, sources and the engine's library, another file after an upgrade.
+    That is options, sources and the engine's library, which is another file after an upgrade.
     """
     fingerprint = hashlib.sha256("\0".join(_OPTIONS).encode())
     for source in model_sources.compiled_sources():

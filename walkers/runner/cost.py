@@ -17,21 +17,21 @@ if TYPE_CHECKING:
     from walkers.physics.bridge import Surfaces
 
 START_UP_SECONDS = 0.04
-"""For each start of the engine, that is for each segment."""
+"""CPU time of each start of the engine, that is of each segment, s."""
 PROGRAM_SECONDS = 1.5
-"""For the imports of a program that runs cases."""
+"""CPU time of the imports of a program that runs cases, s."""
 _STEP_MICROSECONDS = 0.9
-"""For each step of a deck of walkers."""
+"""CPU time of each step of a deck of walkers, µs."""
 _WALKER_MICROSECONDS = 0.22
-"""For each pair of beads of walkers in each step.
+"""CPU time of each pair of beads of walkers in each step, in addition, µs.
 
 Measured in total: 1.0 µs per step for one walker, 2.2 for 6, 6.2 for 24, 22 for 96, 2.6 for 9 in a
 tray.
 """
 _PILE_MICROSECONDS = 1.5
-"""For each step of a deck of loose beads."""
+"""CPU time of each step of a deck of loose beads, µs."""
 _BEAD_STEPS_PER_SECOND = 10.7e6
-"""Loose beads times steps in each second, in addition.
+"""Loose beads times steps in each second of CPU time, in addition, 1/s.
 
 Measured from settled piles on: 11.0 million with 200 beads and 10.2 with 1,630 on a quiet core, 5.7
 million with 60 on a busy one.
@@ -39,27 +39,29 @@ million with 60 on a busy one.
 _GAIN_PER_RANK = 0.9
 """Speed that each MPI process adds to that of the first one."""
 _NEAR_FACET_MICROSECONDS = 0.1
-"""For each bead and each facet of a vessel near it, per step.
+"""CPU time of each bead and each facet of a vessel near it in each step, µs.
 
 Measured: 0.08 to 0.14 with 4 to 60 facets near a bead.
 """
 _FACET_MICROSECONDS = 4e-4
-"""For each bead and each facet anywhere, per step: now and then, the engine lists the near facets.
+"""CPU time of each bead and each facet anywhere in each step, µs.
+
+Now and then, the engine lists the facets near each bead.
 
 Measured: 0.3 to 0.6 ns with 2,700 and 10,000 facets.
 """
 _FACET_START_UP_SECONDS = 4e-5
-"""For each facet in each segment; measured: 0.4 s with 10,000 facets."""
+"""CPU time of each facet in each segment, s; measured: 0.4 s with 10,000 facets."""
 _SOLVING_SECONDS = 0.25
-"""For each shape of bridge without a cached solution; measured: 0.2 to 0.3."""
+"""CPU time of each shape of bridge without a cached solution, s; measured: 0.2 to 0.3 s."""
 _MEASURING_SECONDS = 0.037
-"""For the tables and the result of a run."""
+"""CPU time of the tables and the result of a run, s."""
 _FRAME_MICROSECONDS = 30.0
-"""For each bead of walkers in each frame, when a run is measured."""
+"""CPU time of each bead of walkers in each frame, when a run is measured, µs."""
 _SHARES_OF_ATTEMPTS = (1.0, 0.1, 0.1)
-"""Shares of runs that need a first, second and third attempt.
+"""Shares of runs that need a first, second and third attempt, with more cycles each time.
 
-Such runs may end when their velocities are constant.
+Only runs that end when their velocities are constant have several attempts.
 """
 
 
@@ -85,7 +87,7 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
         segments += RESTING_SEGMENTS
         steps += RESTING_SEGMENTS * settling_steps(case)
     speed_up = 1.0 + _GAIN_PER_RANK * (run.ranks - 1)
-    if case.loose:
+    if case.loose:  # beads outside of walkers, such as a pile
         seconds_a_step = _PILE_MICROSECONDS * 1e-6
         seconds_a_step += case.count / (_BEAD_STEPS_PER_SECOND * speed_up)
     else:
@@ -140,8 +142,8 @@ def _young_laplace_bridges(cases: Iterable[Case]) -> list[Surfaces]:
             kinds.add((liquid, case.contact.roughness, tuple(sorted(set(case.radii)))))
     bridges = []
     for liquid, roughness, radii in kinds:
-        for place, radius in enumerate(radii):
-            for other_radius in (inf, *radii[place:]):
+        for number, radius in enumerate(radii):
+            for other_radius in (inf, *radii[number:]):
                 bridges += Surfaces.between(radius, other_radius, liquid, roughness).volumes
     return bridges
 

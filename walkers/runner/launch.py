@@ -53,7 +53,9 @@ _TEMPORARY_BYTES = 16_000_000
 _STATUS_LINE = re.compile(rb"^ *(\d+) +(\d+) +(\S+)((?: +[-+.\w]+){6}) *$", re.MULTILINE)
 """Step, atoms, speed of the fastest bead (m/s), and the beads' bounds (m: x, x, y, y, z, z)."""
 _ERROR_LINE = re.compile(rb"^.*\bERROR\b.*$", re.MULTILINE)
+"""A line with the word ERROR, whoever wrote it."""
 _LOOP_TIME = re.compile(rb"^Loop time of (\S+) on", re.MULTILINE)
+"""Time of a loop over steps, s: ``Loop time of 1.25 on 1 procs for 1000 steps with 2 atoms``."""
 _FRAME_START = b"ITEM: TIMESTEP"
 """First line of a frame of a local dump."""
 _HEADER_LINES = 9
@@ -404,7 +406,7 @@ class _Watch:
         lost = self.layout.atoms - status.atoms
         self.step = status.step
         self._measure_clearance(status)
-        if not status.speed <= self.deck.fastest:  # a speed that is no number, too
+        if not status.speed <= self.deck.fastest:  # true for NaN, too
             return self._blow_up(status.speed)
         if lost <= 0:
             return None

@@ -60,7 +60,9 @@ mpirun always listens on every address that it finds; with only a loopback, no o
 reach it.
 """
 _UNSHARE_AS_ROOT = ("unshare", "--net")
+"""Command that takes the network away from a program, for root."""
 _UNSHARE_AS_USER = ("unshare", "--net", "--map-current-user", "--keep-caps")
+"""The same for a user, who needs a user namespace."""
 _GRACE_SECONDS = 2.0
 """Time between SIGTERM and SIGKILL."""
 

@@ -109,7 +109,7 @@ def run_place(case: Case, engine: Engine, out: Path) -> Path:
 
     Its name is that of the case, and 12 hexadecimal digits of a hash of the case, the engine, the
     file of a user's law, and the versions of decks and run directories. The text of the deck is not
-    hashed: a comment in a template renames no runs.
+    hashed, so that a comment in a template does not rename runs.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def holds_unfinished(directory: Path) -> bool:
 
 
 def _is_written_before_case(name: str) -> bool:
-    """Whether a file may exist before the case does; ``.case.…`` is a part of the case."""
+    """Whether a file may exist before the case does; ``.case.…`` is the case being written."""
     return name in (SEGMENTS, FAILURE_NAME) or name.startswith(".case.")
 
 
@@ -307,6 +307,9 @@ def is_finished(directory: Path) -> bool:
 
 def drive_from(case: Case, done: Iterable[Mapping[str, Any]]) -> int | None:
     """Step at which the drive begins: the end of the first segment that leaves the beads at rest.
+
+    The drive also begins if the beads do not rest within ``run.longest_settling``. It begins at
+    step 0 if the case does not let the beads come to rest before.
 
     Parameters
     ----------
@@ -453,9 +456,10 @@ def move_into_place(complete: Path, place: Path) -> None:
 
 
 def recover(place: Path) -> None:
-    """Mend a replacement that was interrupted.
+    """Mend a replacement that was interrupted (`move_into_place`).
 
-    Between its two renames it is undone, after them it is finished.
+    If it was interrupted between its two renames, the old run returns to its place; if after them,
+    the old run is removed.
     """
     replaced = place.with_name(place.name + REPLACED)
     if not place.exists() and replaced.exists():
@@ -484,8 +488,8 @@ def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
     Yields
     ------
     dict
-        File descriptors of the locks by place, without the places that another process keeps locked
-        for two more seconds.
+        File descriptors of the locks by place. Places that another process still has locked after
+        `_PATIENCE_SECONDS` are left out.
 
     Raises
     ------
@@ -591,7 +595,10 @@ def _lock(file: Path, deadline: float) -> int | None:
 
 
 def is_locked(place: Path) -> bool:
-    """Whether a process is making the run of a place; on a file system without locks, none can."""
+    """Whether a process is making the run of a place.
+
+    False on a file system without locks, on which no run can be made.
+    """
     file = _lock_file(place)
     if not file.is_file():
         return False
