@@ -2,7 +2,7 @@
 
 Beads are softer than their material, so that the time step can be longer. Young's modulus is
 multiplied by 4 and the time step halved, as the Rayleigh limit allows it, until the headline
-velocities change by less than a share; the last increase is to the largest modulus of a case, that
+velocities change by less than `SHARE`; the last increase is to the largest modulus of a case, that
 of hard materials. Velocities follow no common power of the modulus (docs/explanation/physics.md),
 so nothing is extrapolated.
 """
@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 SHARE = 0.01
 """Share of a velocity that the last increase of Young's modulus may change."""
 _MODULUS_FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0)
-"""Young's moduli, divided by the modulus of the case. The largest one takes 16 times as long."""
+"""Young's moduli, divided by the modulus of the case; with the largest, a run takes 16 times as
+long."""
 _LEAST_INCREASE = 1.25
 """Smallest factor of a last increase of the modulus, to the largest one of a case."""
 _FAMILIES = (
@@ -95,6 +96,7 @@ def measure_accuracy(
     possible = modulus_factors(case)
     _check_is_current(case, directory, engine)
     numbers = recorded(directory)["numbers"]
+    # The modulus is increased at least twice if the case allows it, and further only if necessary.
     for last in range(min(2, len(possible) - 1), len(possible)):
         sweep = _convergence_sweep(case, f"{directory.name}{ACCURACY}", possible[: last + 1])
         record, failures = run_sweep(
@@ -209,7 +211,7 @@ def _largest_change(
 def _errors(
     numbers: Mapping[str, Any], finer: pd.Series, hardest: Mapping[Any, Any]
 ) -> dict[str, dict[str, float]]:
-    """Numerical errors of the numbers of a run, by the same with half its time step or hard beads.
+    """Numerical errors of a run's numbers, from runs at half its time step and with hard beads.
 
     Parameters
     ----------

@@ -174,7 +174,7 @@ def _longest_common_time(piles: pd.DataFrame, climbs: pd.DataFrame) -> float:
     """End of the shortest run without a climb, or of the longest run if all have climbs, in s.
 
     A run ends early if a climber leaves the container; a longer run would show the same first
-    climb. So the ends of runs with climbs are no limit.
+    climb. So the ends of runs with climbs do not limit the time.
     """
     without_climb = piles["driven"][~piles.index.isin(climbs["pile"])]
     if len(without_climb):

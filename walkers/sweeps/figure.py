@@ -255,11 +255,11 @@ def _with_usual_others(x: Factor, x_factors: Sequence[Factor]) -> npt.NDArray[np
 def _empty_grid(number: int, *, share_x: bool) -> tuple[Figure, npt.NDArray[Any]]:
     """A figure with axes for a number of panels, which share the y axis; further axes are off."""
     columns = min(number, _MOST_COLUMNS)
-    if number == 4:
+    if number == 4:  # two rows of two, rather than of three and one
         columns = 2
     rows = ceil(number / columns)
     height = _ONE_PANEL
-    if number > 1:
+    if number > 1:  # square panels, and room for title and legend
         height = 6.0 / columns * rows + 0.9
     figure = new_figure(TWO_COLUMNS, height)
     grid = figure.subplots(rows, columns, sharex=share_x, sharey=True, squeeze=False)

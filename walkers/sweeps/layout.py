@@ -91,9 +91,9 @@ def _factors_of_rows(table: pd.DataFrame, rows: pd.DataFrame) -> list[Factor]:
     places = table.index.get_indexer(rows.index).tolist()
     factors = []
     varying = []
-    for of_table in factors_of(table):
-        values = [of_table.values[place] for place in places]
-        factor = replace(of_table, values=values)
+    for factor_of_table in factors_of(table):
+        values = [factor_of_table.values[place] for place in places]
+        factor = replace(factor_of_table, values=values)
         factors.append(factor)
         if len(factor.levels) > 1:
             varying.append(factor)

@@ -71,15 +71,17 @@ def pack(
         Largest predicted time of a deck of several points, s.
     """
     groups = _sharing_points(cases)
-    whole = 0.0
+    total = 0.0
     for group in groups:
-        whole += PlannedDeck.of_points(group, cases).seconds
+        total += PlannedDeck.of_points(group, cases).seconds
     longest = max(predicted_seconds(case, pairs_of_beads(case)) for case in cases)
+    # Without points that can share a deck, all plans are the same.
     trials = _TRIALS if len(groups) < len(cases) else 1
     plans = []
     spans = []
     for trial in range(trials):
-        length = min(2.0 * max(whole / workers, longest) * 2.0 ** (-trial / 4), longest_seconds)
+        # The first plan has decks of up to twice the time that all workers need together.
+        length = min(2.0 * max(total / workers, longest) * 2.0 ** (-trial / 4), longest_seconds)
         decks: list[PlannedDeck] = []
         for group in groups:
             decks += _split_group(group, cases, length)

@@ -103,8 +103,8 @@ class Theory:
         places
             Their places on the x axis.
         x
-            The factor on the x axis; None if no line joins the points. If it is no key, such as Γ0,
-            the key that varies is changed.
+            The factor on the x axis; None if no line joins the points. If it is a result, such as
+            Γ0, the key that varies is changed.
 
         Returns
         -------

@@ -35,6 +35,10 @@ _MOST_COLOURS = 10
 """Number of colours in the style of the project."""
 _LARGEST_OFFSET = 0.12
 """Largest distance of the symbols of two colours in a category; categories have the distance 1."""
+_LETTERS_PER_INCH = 13.0
+"""Letters of a line of the legend, per inch of the figure."""
+_LETTERS_OF_SYMBOL = 6
+"""Space of a symbol in the legend, in letters."""
 _BAND_OPACITY = 0.25
 """Opacity of bands, from 0 to 1."""
 
@@ -273,7 +277,7 @@ def draw_legend(
     if not handles:
         return
     longest = max(len(str(handle.get_label())) for handle in handles)
-    columns = int(13.0 * figure.get_figwidth() / (longest + 6))
+    columns = int(_LETTERS_PER_INCH * figure.get_figwidth() / (longest + _LETTERS_OF_SYMBOL))
     columns = max(1, min(len(handles), columns))
     title = plain_text(colours.factor.name) if colours.factor is not None else None
     figure.legend(handles=handles, loc="outside lower center", title=title, ncols=columns)

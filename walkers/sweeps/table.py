@@ -10,6 +10,9 @@ The ``attrs`` of the data frame describe its columns and the sweep:
 - ``axes``: for each axis, the keys that vary together
 - ``sampled``: for each key that is drawn from a range, whether the range is log-uniform
 - ``until_below``: the speed (m/s) below which a descent ends; None if the sweep has no descent
+
+A *descent* lowers the last varied key from point to point until the walkers rest; its *threshold*
+lies between the last point at which they move and the first at which they rest.
 """
 
 from __future__ import annotations
@@ -584,6 +587,7 @@ def thresholds(frame: pd.DataFrame) -> pd.DataFrame:
         )
     *other_keys, lowered = frame.attrs["varied"]
     rows = []
+    # The lowered key varies fastest: so many points in a row are one descent.
     for _, points in frame.groupby(frame["point"] // frame[lowered].nunique()):
         row = {name: points.iloc[0][name] for name in other_keys}
         row |= _threshold(points, lowered, frame.attrs["until_below"])
@@ -616,6 +620,7 @@ def _threshold(points: pd.DataFrame, lowered: str, until_below: float) -> dict[s
     finished = points[points["status"] == "finished"]
     slow = finished["velocity"].astype(float).abs() < until_below
     ends = {
+        # The last point before the first slow one: a later point may be fast by chance.
         "moving": finished[~slow.cummax()].tail(1),
         "at_rest": finished[slow].head(1),
     }

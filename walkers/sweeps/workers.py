@@ -74,7 +74,7 @@ class Failure:
 
 
 DeckOutcome: TypeAlias = list[str] | Failure
-"""Outcome of a deck: names of its finished runs, or a failure of a point that is not known."""
+"""Outcome of a deck: names of its finished runs, or a failure whose point is not known."""
 
 
 @dataclass(frozen=True)
