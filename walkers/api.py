@@ -362,7 +362,7 @@ class Run:
         Raises
         ------
         InputError
-            If the file is no PNG, or the run has no such walker.
+            If the file is not a PNG, or the run has no such walker.
         """
         pictures = render_series(self.finished_directory, _path(to), images=images, walker=walker)
         return Pictures(pictures)
@@ -451,7 +451,7 @@ class Run:
         Raises
         ------
         InputError
-            If the file is no HTML file in an existing folder.
+            If the file is not an HTML file in an existing folder.
 
         Examples
         --------
@@ -617,7 +617,7 @@ def check_export(form: str, options: Sequence[str] = ()) -> None:
     Raises
     ------
     InputError
-        If the form is none of `Export`, or does not take one of the options.
+        If the form is not one of `Export`, or does not take one of the options.
     """
     if form not in _OPTIONS_OF_FORMS:
         raise input_error("form", f"{form!r}: {expected_of(form, _OPTIONS_OF_FORMS)}")

@@ -168,4 +168,4 @@ def calibrate(
     files = write_outcome(outcome, folder)
     print(calibration_summary(read_json(folder / CALIBRATION_NAME)))
     print_lines(files)
-    return 0  # a set of parameters whose run fails is no failure: it counts as far off
+    return 0  # parameters whose runs fail are not an error: they count as far off

@@ -72,7 +72,7 @@ def export(
         File or folder to write; default: in the run's folder, archives in the current folder.
         Decks are printed.
     """
-    given = _given(options)
+    given = _given_options(options)
     check_export(form, list(given))
     if form == "deck":
         _export_deck(name, to, lookup)
@@ -80,7 +80,7 @@ def export(
         print(lookup.load(name).export(form, to, **given))
 
 
-def _given(options: ExportOptions) -> dict[str, Any]:
+def _given_options(options: ExportOptions) -> dict[str, Any]:
     """The options that the user has given, as arguments of `walkers.Run.export`."""
     given: dict[str, Any] = {}
     if options.every is not None:

@@ -270,6 +270,8 @@ def _advice_on_length(folder: Path, run: _RunByHand) -> str:
         may_be_short = cycles < planned.cycles
         advice = f"set cycles to {planned.cycles}, as walkers run does, and run again"
     else:
+        # Walkers that are apart (independent of each other) reach a constant velocity; others and
+        # loose beads need not.
         may_be_short = run.case.apart and run.case != run.written
         advice = "increase cycles and run again"
     if not may_be_short or are_constant(folder):
@@ -279,7 +281,7 @@ def _advice_on_length(folder: Path, run: _RunByHand) -> str:
 
 
 def _read_run(folder: Path, deck: Path, log: Path) -> _RunByHand:
-    """What was run, by the record of the written deck, the deck as it is now, and the log."""
+    """What was run, from the record of the written deck, the deck as it is now, and the log."""
     record = read_json(folder / run_directory.DECK_RECORD_NAME)
     written = run_directory.with_recorded_law(stored_case(record["case"]), folder)
     values = _printed_parameters(log)
@@ -409,7 +411,7 @@ def _changes(
     if "cycles" in edited:
         cycles = int(values["cycles"])
         changes["run.cycles"] = cycles
-        if case.apart:
+        if case.apart:  # walkers that are independent of each other are measured once settled
             changes["run.settling_cycles"] = settling_of(cycles)
     return changes
 

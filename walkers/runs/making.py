@@ -179,6 +179,7 @@ def progress_at(place: Path, case: Case | None = None) -> Progress | None:
 
 
 def _progress_of_shared_deck(folder: Path) -> Progress:
+    """Progress of the shared deck in a folder, from the last step in its log."""
     share = last_step(folder / decks.OUTPUT_NAME) / run_directory.read_layout(folder).steps
     percent = f"{100 * share:.0f} %"
     return Progress(share, percent, percent)

@@ -60,6 +60,7 @@ def notes(case: Case) -> list[str]:
             f"{processes} share {counted(cores, 'core')} of this machine: "
             "the run takes many times longer than predicted"
         )
+    # Loose beads that are drawn from a mixture and poured into a container.
     if case.loose and case.boundary.closed and case.mixture:
         lines += _pile_notes(case)
     return lines
@@ -137,7 +138,8 @@ def summarise(case: Case) -> dict[str, Any]:
             Of a vessel: numbers of its planes, triangles and faces; whether it is open; extent of
             the opening and direction out of it; height; volume.
         ``dimer``
-            Of dimers: masses, mean radius, sin δ, mass asymmetry, Γ0.
+            Of dimers: masses, mean radius, sin δ, mass asymmetry, and Γ0, the peak inertial force
+            over the capillary force 4πγR̄.
     """
     drive = case.excitation
     origins = [asdict(origin) for origin in case.origins]

@@ -67,8 +67,8 @@ def state_at(place: Path, directory: Path | None = None) -> PointState:
     place
         The final directory of the run.
     directory
-        The directory of its unfinished run, if the state of this run is asked for even where
-        another one is finished.
+        The directory of an unfinished run whose state is asked for, even if a finished run is in
+        the place. None: the finished run if there is one, otherwise the unfinished one.
     """
     if directory is None and is_finished(place):
         return PointState("finished", place)

@@ -230,7 +230,7 @@ def _quantities_of_pile(motion: Motion) -> list[ComparedQuantity]:
 
 
 def _quantities_of_loose_beads(motion: Motion) -> list[ComparedQuantity]:
-    """Mean velocity of the centre of mass of beads that are no walkers."""
+    """Mean velocity of the centre of mass of beads that are not in walkers."""
     weights = motion.radius**3 / np.sum(motion.radius**3)
     displacement = weights @ (motion.position[-1] - motion.position[0])
     along_x, along_y, along_z = (1e3 * displacement / np.ptp(motion.time)).tolist()
@@ -269,7 +269,7 @@ def with_cycles(case: Case, cycles: int) -> Case:
     Raises
     ------
     ValueError
-        If the case is sampled less than once a cycle and ``cycles`` is no multiple of the cycles
+        If the case is sampled less than once a cycle and ``cycles`` is not a multiple of those
         between samples, or if there would be fewer than three samples.
     """
     cycles_per_sample = case.run.cycles_per_sample

@@ -396,7 +396,7 @@ def add_force(  # noqa: PLR0913, PLR0917 (a kernel, whose arguments are numbers 
 
 @inlined
 def separation(constants: Constants, state: State, i: int, j: int) -> tuple[Vector, float]:
-    """Normal and gap of a bead i and a body j, which is a wall if j is no number of a bead.
+    """Normal and gap of a bead i and a body j, which is a wall if j is not a bead's number.
 
     Returns
     -------
@@ -496,6 +496,7 @@ def volume_step(bridges: BridgeSplines, share: float) -> int:
     level = least - 1
     if share > 0.0:
         level = round(2.0 * log2(share))
+    # As in engine/law.h, the smallest volume may be at most 1.2 times what the films offer.
     if level < least and 1.2 * share < 2.0 ** (-0.5 * bridges.full_step):
         return -1
     return bridges.full_step + min(max(level, least), 1)

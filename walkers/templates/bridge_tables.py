@@ -97,7 +97,7 @@ class BridgeTable:
         far = self.cells * (
             self.octaves + 2.0 * (1.0 - np.sqrt((rupture - gaps) / (rupture - middle)))
         )
-        place = np.where(gaps < middle, near, far)
+        place = np.where(gaps < middle, near, far)  # in cells from the start of the table
         cell = np.minimum(place.astype(int), (len(self.rows) - 1) // 3 - 1)
         # Lagrange's polynomials of the rows at 0, 1/3, 2/3 and 1 of the cell; products and sums
         # alone have the same bits on every processor.

@@ -107,7 +107,7 @@ From 0.1 to 0.3 mm, the time per step changes by a few per cent.
 _MOST_BINS = 2e4
 """Number of bins of the neighbour search into which the box of a few beads is divided at most."""
 
-# --- limits of the watch --------------------------------------------------------------------------
+# --- limits beyond which a running engine is stopped (`walkers.runner.launch`) --------------------
 
 _SILENCE = 600.0
 """Shortest silence of the engine that counts as a failure, s.
@@ -374,7 +374,7 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
         restart_to=restart_to,
         restart_from=restart_from,
         fastest=max(fastest_of(sharing, scene) for sharing in cases),
-        skin=_SKIN if case.loose else None,
+        skin=_SKIN if case.loose else None,  # loose beads are close to each other
     )
 
 
@@ -570,7 +570,7 @@ def _neighbour_search(plan: Plan) -> NeighbourSearch:
     fitting = ceil((distance**3 - largest**3) / smallest**3)
     bin_size = None
     if plan.skin is None:
-        # At most about ten thousand bins, none smaller than two beads.
+        # At most `_MOST_BINS` bins, none narrower than two of the largest beads.
         sides = zip(plan.scene.lower, plan.scene.upper, strict=True)
         volume = prod(high - low for low, high in sides)
         bin_size = max(4.0 * largest, (volume / _MOST_BINS) ** (1.0 / 3.0))

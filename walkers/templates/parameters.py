@@ -62,7 +62,7 @@ def suffixes(count: int) -> list[str]:
     """Suffixes for the names of several parameters of one kind; empty for a single parameter."""
     if count == 1:
         return [""]
-    return [f"_{place}" for place in range(1, count + 1)]
+    return [f"_{number}" for number in range(1, count + 1)]
 
 
 def in_cycles(steps: int, steps_per_cycle: int) -> str:

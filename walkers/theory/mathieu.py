@@ -46,7 +46,7 @@ zero."""
 _NEUTRAL = 1e-6
 """Growth per unit of ϑ, or multiplier minus one, that counts as zero."""
 _SLOWEST = 1e-4
-"""m/s; a contact that slides more slowly resists sideways sliding as at this speed."""
+"""Speed in m/s; a contact that slides more slowly resists sideways sliding as at this speed."""
 _STEPS = 256
 """Steps per cycle of the axial motion."""
 _MATHIEU_STEPS = 128
@@ -237,6 +237,8 @@ def _resistance_to_rolling(case: Case, axial: _AxialMotion) -> FloatArray:
     """
     dimer = dimer_of(case)
     drive = case.excitation
+    # A bead that rolls on a shaken substrate moves relative to it at 5/7 of the drive's velocity
+    # a0/ω; this is the root mean square of the part across the axis.
     speed = 5.0 / 7.0 * drive.peak_acceleration / (2.0 * pi * drive.frequency) * _ANGLE / sqrt(2.0)
     radii = np.array([*dimer.radii, dimer.reduced_radius])[:, None]
     first_spin, second_spin = axial.spin

@@ -129,9 +129,12 @@ def _smallest_gamma(
 ) -> tuple[float, str | None]:
     """The smallest Γ0 at which something happens to the walker of a case.
 
-    It is sought up to a largest one, and is NaN if it does not happen there.
-
-    The second value is the reason why the walker has no velocity there, None if it has one.
+    Returns
+    -------
+    gamma : float
+        Γ0; NaN if nothing happens up to ``largest_gamma``.
+    reason : str or None
+        Why the walker has no velocity at this Γ0; None if it has one, or if nothing happens.
     """
     dimer = dimer_of(case)
     walker = Walker.of_case(case)
@@ -318,10 +321,10 @@ def predicted_column(
         return {}, {f"the theory has no {column}": len(cases)}
     reasons: Counter[str] = Counter()
     applicable = []
-    for place, case in enumerate(cases):
+    for number, case in enumerate(cases):
         reason = _why_not(case, column)
         if reason is None:
-            applicable.append(place)
+            applicable.append(number)
         else:
             reasons[reason] += 1
     if not applicable:
@@ -346,17 +349,18 @@ def _velocities_by_coulomb(
 ) -> FloatArray:
     """Values of a field of `PredictedMotion` for N cases, m/s, shape (N,).
 
-    The reasons for values that are NaN are counted in place.
+    ``applicable`` are the numbers of the cases to which the theory applies. The reasons for values
+    of theirs that are NaN are counted in place.
     """
     values = np.full(len(cases), np.nan)
-    motion = motion_of(*[cases[place] for place in applicable])
+    motion = motion_of(*[cases[number] for number in applicable])
     computed = getattr(motion, quantity)
     if contact is not None:
         computed = computed[contact]
-    for walker, place in enumerate(applicable):
+    for walker, number in enumerate(applicable):
         reason = _why_no_velocity(motion, walker)
         if reason is None:
-            values[place] = computed[walker]
+            values[number] = computed[walker]
         else:
             reasons[reason] += 1
     return values
@@ -367,16 +371,17 @@ def _velocities_by_the_paper(
 ) -> FloatArray:
     """Velocities in the model of the paper for N cases, m/s, shape (N,).
 
-    The reasons for values that are NaN are counted in place.
+    ``applicable`` are the numbers of the cases to which the theory applies. The reasons for values
+    of theirs that are NaN are counted in place.
     """
     velocities = np.full(len(cases), np.nan)
-    for place in applicable:
-        case = cases[place]
+    for number in applicable:
+        case = cases[number]
         reason = why_not_the_paper(case)
         if reason is None:
             dimer = dimer_of(case)
             gamma0 = dimer.gamma0(case.excitation.peak_acceleration)
-            velocities[place] = mean_velocity(gamma0, dimer.sin_delta)
+            velocities[number] = mean_velocity(gamma0, dimer.sin_delta)
         else:
             reasons[f"{PAPER_FIT}: {reason}"] += 1
     return velocities

@@ -49,10 +49,9 @@ _LIFT = 9
 _REST = 12
 """Row of F0."""
 _REPEATED = 1e-6
-"""m/s; cycles repeat if their mean sliding velocities differ by less than this."""
+"""Difference of the mean sliding velocities of two cycles below which cycles repeat, m/s."""
 _FAST = 3e-3
-"""m/s; for velocities above this one, the allowed difference grows in proportion to the
-velocity."""
+"""Velocity above which the allowed difference grows in proportion to the velocity, m/s."""
 _SCATTER = 10.0
 """Error of the steps, as a multiple of that difference.
 
@@ -114,9 +113,8 @@ def integrate(  # noqa: PLR0913, PLR0917
     series = np.zeros((count, steps, 3))
     work = np.zeros((8, 3))
     first_later_cycle = cycles // 2
-    whole_step = int(
-        np.int64(0)
-    )  # for a literal 0, numba compiles a version that its cache cannot load
+    # For a literal 0, numba compiles a version that its cache cannot load.
+    whole_step = int(np.int64(0))
     for walker in range(count):
         state = np.zeros((4, 3))
         totals = np.full((2, 3), np.inf)  # mean sliding velocities, smallest normal forces
