@@ -180,7 +180,8 @@ class Emulator:
         high = (most - centre) / self.observation.deviation
         below_high = student.cdf((high - mean) / width, _DEGREES_OF_FREEDOM)
         below_low = student.cdf((low - mean) / width, _DEGREES_OF_FREEDOM)
-        return np.asarray(np.log(np.maximum(below_high - below_low, 1e-300)))
+        probability = np.maximum(below_high - below_low, 1e-300)  # its logarithm must be finite
+        return np.asarray(np.log(probability))
 
     def numbers(self, points: FloatArray, normal: FloatArray) -> FloatArray:
         """Sample the number of the observation.

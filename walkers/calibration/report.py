@@ -31,6 +31,10 @@ CALIBRATION_NAME = "calibration.json"
 """Name of the record of a calibration."""
 _INTERVAL = (0.05, 0.5, 0.95)
 """Quantiles of parameters that are reported."""
+_HEIGHT_OF_FACT = 0.25
+"""Height of the row of a fact in the figure, inches."""
+_HEIGHT_AROUND_FACTS = 1.5
+"""Height of the axis and the legend of the figure, inches."""
 _MARKERS = "os^DvPX*"
 """Markers of the sets in figures, which are repeated."""
 
@@ -255,7 +259,7 @@ def draw_facts(outcome: Outcome) -> Figure:
     held out, from 5 to 95 %.
     """
     facts = outcome.calibration.file.observations
-    figure = new_figure(TWO_COLUMNS, 0.25 * len(facts) + 1.5)
+    figure = new_figure(TWO_COLUMNS, _HEIGHT_OF_FACT * len(facts) + _HEIGHT_AROUND_FACTS)
     axes = figure.subplots()
     heights = np.arange(len(facts))[::-1]
     axes.axvspan(-1.0, 1.0, color="0.9", lw=0)
@@ -268,7 +272,7 @@ def draw_facts(outcome: Outcome) -> Figure:
         if predicted is not None:
             low = fact.residual(predicted[0])
             high = fact.residual(predicted[2])
-            axes.hlines(height - 0.25, low, high, color="k", lw=1.0)
+            axes.hlines(height - 0.25, low, high, color="k", lw=1.0)  # below the markers
     axes.set_yticks(heights, [fact.title for fact in facts], fontsize=7)
     axes.set_xlabel("distance from the fact/deviation (lines: predicted)")
     axes.set_ylim(-0.8, len(facts) - 0.2)

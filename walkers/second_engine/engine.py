@@ -29,6 +29,11 @@ _SKIN = 0.4
 nearly half the skin."""
 
 
+_VOLUME_STEPS = 8
+"""Steps of √2 from the smallest volume of a bridge to that of a bridge of full films, where liquid
+is conserved (`walkers.physics.bridge.Surfaces.volumes`)."""
+
+
 class SecondEngine:
     """Beads that move in the frame of the walls.
 
@@ -257,7 +262,7 @@ def _bridges(case: Case, radius: FloatArray, strengths: Mapping[str, float]) -> 
         size=size_of_bead.astype(np.int64),
         first_bridge=first_bridge,
         volume=np.array(volumes),
-        full_step=8 if case.liquid.conserved else 0,
+        full_step=_VOLUME_STEPS if case.liquid.conserved else 0,
         contribution=contribution,
         liquid=4.0 / 3.0 * pi * radius**3 * case.liquid.of_bridges.volume_fraction,
     )
@@ -265,11 +270,15 @@ def _bridges(case: Case, radius: FloatArray, strengths: Mapping[str, float]) -> 
 
 @lru_cache(maxsize=4096)
 def _spline(law: BridgeLaw, surfaces: Surfaces) -> tuple[FloatArray, FloatArray]:
-    """Row of `BridgeSplines.spans` and of its splines for a bridge; a kink may be at the scale."""
+    """The row of a bridge in `BridgeSplines.spans`, and its splines.
+
+    The first piece ends at the law's ``scale``, where forces may have a kink, so that no spline
+    crosses it.
+    """
     curve = law(surfaces)
     rupture = curve.rupture
     scale = curve.scale if curve.scale else surfaces.roughness
-    if scale >= rupture:
+    if scale >= rupture:  # all pieces must end below the rupture; there is no kink before it
         scale = 0.4 * rupture
     middle = max(0.5 * rupture, 0.5 * (scale + rupture))
     t = np.linspace(0.0, 1.0, CELLS + 1)

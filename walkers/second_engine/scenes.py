@@ -495,12 +495,17 @@ def _errors_of_forces(case: Case, scene: PlacedBodies, bench: Bench) -> dict[str
 # --- scenes ---------------------------------------------------------------------------------------
 
 _LEANING_WALL = Flat((1e-4, 2e-4, -3e-4), (0.48, -0.36, 0.8), "leaning")
+"""A tilted plane through a point (m) with a unit normal along no axis."""
 _SIDE_WALL = Flat((0.0, 6.0e-4, 1e-3), (0.0, -1.0, 0.0), "+y")
+"""An upright plane at y = 0.6 mm."""
 _ROUND_WALL = Round(2.5e-3)
+"""An upright cylinder with a radius of 2.5 mm."""
 _ROLLING_SPIN: Vector = (0.0, 0.03 / LARGE_RADIUS, 0.0)
 """Spin of a large bead that rolls along x at 3 cm/s, rad/s."""
 _LEAVING_BEAD = bead_at_plane(BOTTOM, -OVERLAP, LARGE_RADIUS, velocity=_UPWARD)
+"""A bead that touches the floor and leaves it."""
 _PARTING_PAIR = pair(-OVERLAP, 0.043, (0.02, -0.011, 0.005))
+"""Two beads that touch and part."""
 CLIMBING = [
     Bead(0, (0.0, 0.0, LARGE_RADIUS - OVERLAP), LARGE_RADIUS, (0.01, 0.02, 0.0), (5.0, 9.0, 40.0)),
     Bead(
