@@ -150,7 +150,8 @@ def modulus_factors(case: Case) -> Sequence[float]:
             "time step; walkers climb gives the scatter over starts (run.seed)",
         )
     hardest = STIFFEST / case.contact.youngs_modulus
-    possible = [factor for factor in _MODULUS_FACTORS if factor <= hardest * (1.0 + 1e-9)]
+    limit = hardest * (1.0 + 1e-9)  # but for rounding
+    possible = [factor for factor in _MODULUS_FACTORS if factor <= limit]
     if len(possible) < len(_MODULUS_FACTORS) and hardest >= _LEAST_INCREASE * possible[-1]:
         possible.append(hardest)
     return possible

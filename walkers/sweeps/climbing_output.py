@@ -60,6 +60,7 @@ _ALL = _Subset(label="all", key="", marker="ko")
 _ON_PLAIN_WALLS = _Subset(label="plain walls", key="on_plain_walls", marker="C1s")
 _IN_CORNERS = _Subset(label="corners", key="in_corners", marker="C2^")
 _SUBSETS = (_ALL, _ON_PLAIN_WALLS, _IN_CORNERS)
+"""The subsets in the order of table and legend."""
 _MISSING = "–"
 """Text of a statistic that does not exist, such as the speed if nothing climbed."""
 _ROW_HEIGHT = 2.1
@@ -183,7 +184,7 @@ def climbs_figure(climbs: Sequence[Mapping[str, Any]]) -> Figure:
     and Meier's estimate), and speeds against sizes. Below are the rates of all conditions with
     their exact 95 % intervals, and the number of piles that climbed.
     """
-    heights = [1.0, 0.3 + len(climbs) / 6.0]
+    heights = [1.0, 0.3 + len(climbs) / 6.0]  # of the rows of panels, over `_ROW_HEIGHT`
     mosaic: list[Any] = [["survival", "climbs"], ["rates", "rates"]]
     figure = new_figure(TWO_COLUMNS, _ROW_HEIGHT * sum(heights))
     axes = figure.subplot_mosaic(mosaic, height_ratios=heights)
@@ -243,7 +244,7 @@ def _draw_rates(axes: Axes, table: pd.DataFrame) -> None:
     """Rates with their exact intervals, one condition below the other."""
     for number, subset in enumerate(_SUBSETS):
         rows = table[table["where"] == subset.label]
-        places = np.arange(len(rows)) + 0.2 * (number - 1)
+        places = np.arange(len(rows)) + 0.2 * (number - 1)  # one subset below the other
         rates = rows["rate"].astype(float)  # NaN without a drive
         errors = [rates - rows["rate_low"], rows["rate_high"] - rates]
         axes.errorbar(

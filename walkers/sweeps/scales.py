@@ -65,7 +65,7 @@ def _name_categories(axes: Axes, x: Factor) -> None:
         axes.set_xticks(places, names, rotation=35, ha="right", rotation_mode="anchor")
     else:
         axes.set_xticks(places, names)
-    axes.set_xlim(-0.6, len(x.levels) - 0.4)
+    axes.set_xlim(-0.6, len(x.levels) - 0.4)  # categories are at 0, 1, 2, …
 
 
 def _has_few_values(x: Factor) -> bool:
@@ -155,6 +155,6 @@ def _widened(low: float, high: float) -> tuple[float, float]:
     if high - low > _LEAST_RANGE * abs(middle) and high - low >= ROUNDING:
         return low, high
     half = 1.0
-    if abs(middle) > ROUNDING:
+    if abs(middle) > ROUNDING:  # a range of a tenth of the value
         half = 0.05 * abs(middle)
     return middle - half, middle + half

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 Style: TypeAlias = dict[str, Any]
 """Keyword arguments of matplotlib: colour, symbol and its size."""
 _UP: Style = {"marker": "o", "color": "0.3", "label": "started facing right (up)"}
+"""Entry of the legend for walkers that face up a slope."""
 _DOWN: Style = {"marker": "v", "color": "0.3", "label": "started facing left (down)"}
+"""Entry of the legend for walkers that face down a slope."""
 _MARKERS = "osD^vXP<>*"
 """Symbols of the colours."""
 _MODEL_LINES = ("--", ":")
@@ -64,7 +66,8 @@ class Colours:
         levels: list[Any] = factor.levels if factor else [None]
         styles = {}
         for number, (level, colour) in enumerate(zip(levels, _colours(len(levels)), strict=True)):
-            # Symbols that are drawn later are smaller, so that those of coinciding points are seen.
+            # Symbols that are drawn later are smaller, so that those of coinciding points are seen:
+            # by one point a level, or by less if there are many levels.
             later = len(levels) - 1 - number
             styles[level] = {
                 "marker": _MARKERS[number % len(_MARKERS)],

@@ -125,8 +125,8 @@ class Slurm(BaseModel):
             launch_cmd=launch_command,
             address=self.address,
             max_workers_per_node=self.cores,
-            heartbeat_period=10,
-            heartbeat_threshold=60,
+            heartbeat_period=10,  # s
+            heartbeat_threshold=60,  # s without a sign of life after which a worker is lost
             block_error_handler=windowed_error_handler,
         )
         return Config([executor], strategy_period=2)

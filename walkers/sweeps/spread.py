@@ -70,6 +70,7 @@ _OUTCOMES = {
 }
 """What walkers do, by the keys of `Spread.counts`."""
 _OUTCOMES_ON_A_SLOPE = {**_OUTCOMES, "forward": "go up the slope", "backward": "go down"}
+"""The same for walkers on a slope."""
 _INDENT = " " * 13
 """Start of the lines below a heading."""
 

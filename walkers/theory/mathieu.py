@@ -220,6 +220,7 @@ def _axial_motion(case: Case, walker: Walker) -> _AxialMotion | None:
     radii = np.array(dimer.radii)[:, None]
     masses = np.array(dimer.masses)[:, None]
     acceleration = translation(slope)
+    # Moments of inertia of solid spheres are 0.4 m R².
     rolling_torque = 0.4 * masses * radii * (acceleration - slope[:2])
     return _AxialMotion(
         sliding=sliding,

@@ -70,6 +70,7 @@ def check_applies(*cases: Case) -> None:
         if case.drive.ramp or not case.excitation.is_plain or case.excitation.direction[2] != 0.0:
             text = "the theory is for a single harmonic along the plane, without a phase or a ramp"
             raise NotApplicable("drive", text)
+        # But for rounding, all gravity along the plane acts along the axis.
         if hypot(*case.gravity_vector[:2]) > abs(case.axial_gravity) + 1e-9:
             text = "the theory is for planes tilted along the drive"
             raise NotApplicable("boundary.uphill", text)
