@@ -154,7 +154,7 @@ def _compile(place: Path, fingerprint: str) -> None:
     with tempfile.TemporaryDirectory(dir=make_cache_folder()) as folder:
         library = Path(folder) / place.name
         _run_compiler(compiler, mpi_compiler, library)
-        library.chmod(0o755)
+        library.chmod(0o755)  # for any umask: a file that others can write is not loaded
         record = Path(folder) / "record.json"
         write_json(record, _record(library, fingerprint))
         record.chmod(0o644)

@@ -420,8 +420,8 @@ def _keys_of_parameters(case: Case) -> dict[str, str]:
     """For each parameter of the deck of a case, the key of the case."""
     keys = dict(_KEYS)
     count = len(case.excitation.harmonics)
-    for place, suffix in enumerate(suffixes(count)):
-        table = "drive" if count == 1 else f"drive.harmonics[{place}]"
+    for index, suffix in enumerate(suffixes(count)):
+        table = "drive" if count == 1 else f"drive.harmonics[{index}]"
         for name in _HARMONIC_PARAMETERS:
             keys[f"{name}{suffix}"] = f"{table}.{name}"
     return keys

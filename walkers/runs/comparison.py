@@ -42,10 +42,12 @@ _VELOCITIES = ("velocity", "right_facing", "left_facing")
 _HIDDEN_CHANGE = 2e-3
 """Relative difference below which printed values may be rounded to a difference of their own."""
 _DASH = "-"
+"""A cell without a number."""
 _OTHER_BRIDGE_TABLES = (
     "its bridge tables are not those of this program: made by another version, "
     "or on another kind of machine"
 )
+"""Remark on a run whose forces differ from those that this program would compute."""
 
 
 @dataclass(frozen=True)
@@ -247,6 +249,7 @@ def _not_compared(first: Results, second: Results) -> set[str]:
 
 
 def _compared_number(name: str, unit: str, first: Results, second: Results) -> _ComparedNumber:
+    """A number of two results, with its errors; NaN in a result that does not have it."""
     value_of_first = _number(first.get(name))
     value_of_second = _number(second.get(name))
     scatter = scatter_of(name)

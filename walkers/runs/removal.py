@@ -26,6 +26,7 @@ from walkers.text import aligned
 _MOST_LINES = 40
 """Largest number of removals that are listed one by one."""
 _IN_PROGRESS = "kept: a process is computing it"
+"""Why a run in progress is not removed."""
 
 
 class RemovalKind(Enum):

@@ -122,6 +122,7 @@ def _parts_of(layout: DeckLayout, cases: Mapping[Path, Case]) -> list[_Part]:
 
 
 def _renumbering(layout: DeckLayout, parts: Sequence[_Part]) -> _Renumbering:
+    """Case and new id of each bead of a shared deck, from the parts of all cases."""
     case_number = np.zeros(layout.atoms + 1, dtype=np.int64)
     new_id = np.zeros(layout.atoms + 1, dtype=np.int64)
     for number, part in enumerate(parts):
@@ -155,7 +156,7 @@ def _split_bridges(
 
     Both beads of a bridge belong to the same case.
     """
-    id_columns = [place for place, column in enumerate(columns) if column in _ID_COLUMNS]
+    id_columns = [index for index, column in enumerate(columns) if column in _ID_COLUMNS]
     frames = list(local_frames(dump, columns))
     for number, part in enumerate(parts):
         frames_of_case = []

@@ -256,6 +256,9 @@ def _box(
 ) -> tuple[Vector, Vector]:
     """Lower and upper corner of the simulation box, m.
 
+    It contains the paths of all walkers. Above the beads that a case places, it has room for ten
+    radii of the largest bead, the highest hop of a walker, and the drive in both directions.
+
     Parameters
     ----------
     cases
