@@ -91,6 +91,7 @@ class Versions:
 
 
 _TODAY = Versions()
+"""The versions of the program that runs."""
 
 
 @dataclass(frozen=True)
@@ -321,9 +322,9 @@ _COLUMNS_OF_CLIMBS = (
 """Columns of the table of climbs, of those of `walkers climb`."""
 
 _VERSIONS_OF_PILES = Versions(decks=9, results=1)
-"""Versions of the piles, whose statistics stand until what piles do changes.
+"""Versions of the piles; their statistics stay valid until the behaviour of piles changes.
 
-Making them again takes four core-hours, for other last digits of tables.
+Making them again takes four core-hours, and changes only the last digits of tables.
 """
 
 
@@ -462,6 +463,10 @@ def _draw_strengths(axes: Axes, drifts: FloatArray) -> None:
     axes.set(xlabel="a/(7/2 μg)", ylabel="drift / (7/2 μg/ω)")
 
 
+_SHOWN_SPEED = 2
+"""Index of the speed of the drawn impacts, 1 m/s, in `studies.literature.experiments.SPEEDS`."""
+
+
 def _draw_impacts(axes: Axes, bench: Bench) -> None:
     """Draw the restitution of impacts at 1 m/s on a wet plate against 1/St."""
     law_with_film = f"{experiments.__file__}:law_with_film"
@@ -471,10 +476,11 @@ def _draw_impacts(axes: Axes, bench: Bench) -> None:
         "50 MPa": experiments.restitutions(bench, modulus=5e7),
     }
     for label, (stokes, restitution) in curves.items():
-        x = 1.0 / stokes[:, 2]
-        axes.plot(x, restitution[:, 2], "o-", mfc="none", ms=4.0, lw=1.0, label=label)
+        x = 1.0 / stokes[:, _SHOWN_SPEED]
+        y = restitution[:, _SHOWN_SPEED]
+        axes.plot(x, y, "o-", mfc="none", ms=4.0, lw=1.0, label=label)
     stokes, _ = curves["50 MPa"]
-    inverse = np.array([0.0, 1.0 / stokes[:, 2].min()])
+    inverse = np.array([0.0, 1.0 / stokes[:, _SHOWN_SPEED].min()])
     loss = np.log(experiments.FILM / experiments.ROUGHNESS) * inverse
     lubrication = experiments.DRY_RESTITUTION * (1.0 - loss)
     axes.plot(inverse, lubrication, "k--", lw=1.0, label="lubrication, approach")

@@ -52,9 +52,9 @@ def means_of_trays(table: pd.DataFrame) -> list[dict[str, str]]:
     """
     percent = (100.0 * table["coverage"]).round()
     conditions = [table["walkers"], percent, table["drive.peak_acceleration"]]
-    seeds = table.groupby(conditions)[_COLUMNS_OF_TRAYS]
-    means = seeds.mean().map("{:.2g}".format)
-    deviations = seeds.std().map("{:.2g}".format)
+    replicates = table.groupby(conditions)[_COLUMNS_OF_TRAYS]
+    means = replicates.mean().map("{:.2g}".format)
+    deviations = replicates.std().map("{:.2g}".format)
     texts = (means + " ± " + deviations).replace("nan ± nan", _MISSING)
     rows = []
     for (walkers, coverage, peak), row in texts.T.to_dict().items():

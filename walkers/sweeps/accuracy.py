@@ -105,7 +105,7 @@ def measure_accuracy(
         if failures:
             raise SweepStopped(f"{failures[0].run}: {failures[0].message}")
         table = table_of(record).frame
-        by_modulus = [numbers, *table[1:].to_dict("records")]
+        by_modulus = [numbers, *table[1:].to_dict("records")]  # row 0 has half the time step
         before = by_modulus[max(last - 1, 0)]
         hardest = by_modulus[last]
         change = _largest_change(before, hardest, _headline_velocities(case, table))
@@ -200,7 +200,11 @@ def _headline_velocities(case: Case, table: pd.DataFrame) -> list[str]:
 def _largest_change(
     before: Mapping[Any, Any], after: Mapping[Any, Any], names: Iterable[str]
 ) -> float:
-    """The largest relative change of velocities; those that are not finite do not count."""
+    """The largest relative change of velocities, of which at least one must be finite.
+
+    Those that are not finite do not count, such as that of walkers that face down if all face up.
+    Changes are relative to no less than `STEADY_SPEED`.
+    """
     changes = []
     for name in names:
         change = abs(after[name] - before[name]) / max(abs(after[name]), STEADY_SPEED)

@@ -70,9 +70,9 @@ def figure_of(
 ) -> Figure:
     """The figure of the table of a sweep, with the predictions of a theory if there is one.
 
-    Bars are the scatter over copies where the table has it. Without y, on slopes where the walkers
-    that face up and down differ, both are drawn. The axis of a key has the unit of the sweep file;
-    other columns are in mm, mm/s, g (9.8 m/s²) and degrees. A
+    Bars are the scatter over replicates where the table has it. Without y, on slopes where the
+    walkers that face up and down differ, both are drawn. The axis of a key has the unit of the
+    sweep file; other columns are in mm, mm/s, g (9.8 m/s²) and degrees. A
     `walkers.sweeps.left_out.LeftOutWarning` says what is left out.
 
     Parameters
@@ -87,7 +87,8 @@ def figure_of(
     Raises
     ------
     InputError
-        If no point is finished, there is no such column, or keys would be hidden.
+        If no point is finished, there is no such column, keys would be hidden, or ``log`` is not
+        possible.
     """
     if options.log and options.log not in get_args(Log):
         raise input_error("log", f"{options.log!r}: {expected_of(options.log, get_args(Log))}")
@@ -233,7 +234,7 @@ def _with_usual_others(x: Factor, x_factors: Sequence[Factor]) -> npt.NDArray[np
     """Which points the panel of a factor shows, shape (N,).
 
     If factors vary one at a time, these are the points with the usual values of the other factors;
-    otherwise all.
+    otherwise all. The usual value of a factor is its most frequent one.
 
     Parameters
     ----------

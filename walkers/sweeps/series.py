@@ -193,6 +193,8 @@ def draw_series(
 ) -> None:
     """Draw points with error bars, bands, and the points of walkers that face down.
 
+    Error bars are left out if all of them are smaller than the symbols (`errors_seen`).
+
     Parameters
     ----------
     axes

@@ -184,6 +184,9 @@ def _check_letters(source: str, text: str) -> None:
 def decks_at(config: Config, ranks: int) -> int:
     """Number of decks that run at once at a site, on all nodes of all jobs.
 
+    Zero if a node has fewer cores than a deck has processes. Executors of Parsl that get no nodes
+    from a provider do not count.
+
     Parameters
     ----------
     config

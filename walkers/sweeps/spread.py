@@ -181,6 +181,8 @@ def _uncertain_values(case: Case) -> list[Origin]:
 def _range_of(value: Origin) -> dict[str, list[Any]]:
     """The range of an uncertain value for the sampler of a sweep, with the value as the median.
 
+    The range of a value that the program computes, such as a time step, has no median.
+
     Raises
     ------
     InputError
@@ -192,7 +194,7 @@ def _range_of(value: Origin) -> dict[str, list[Any]]:
     ends = ranges_of({value.key: {distribution: [low, high]}})[value.key]
     try:
         usual = _number_in_unit(value, ends.unit)
-    except ValueError:  # a value that the program computes, such as a time step
+    except ValueError:  # a word, such as "auto", in place of a number
         return {distribution: [low, high]}
     if not ends.low * (1.0 - _ROUNDING) <= usual <= ends.high * (1.0 + _ROUNDING):
         message = f"expected a range that holds the case's own value, {value.text}"

@@ -513,7 +513,12 @@ def cells_of(
 
 
 def _printed_columns(frame: pd.DataFrame) -> list[str]:
-    """Names of the columns that may be printed: all keys, and the most important results."""
+    """Names of the columns that may be printed, in the order of the table.
+
+    They are all keys, the most important results (`_SHOWN`), and the main results with the ends of
+    their bands, but without numerical errors. If `sides_differ`, the velocities of both sides are
+    printed instead of their mean.
+    """
     printed = set(_SHOWN)
     if sides_differ(frame):
         printed.update(SIDES)
