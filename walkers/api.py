@@ -481,6 +481,13 @@ class Run:
         -------
         walkers.sweeps.spread.Spread
             The bands of the result, 5 to 95 %.
+
+        Raises
+        ------
+        InputError
+            If no value of the case is uncertain, or the number of draws is out of its limits.
+        SweepStopped
+            If a failure affects every draw.
         """
         case = self.requested or self.case
         with progress_of(f"{case.name}, spread", progress) as advance:

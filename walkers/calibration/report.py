@@ -204,7 +204,10 @@ def _posterior_samples(outcome: Outcome) -> dict[str, FloatArray]:
 
 
 def _observation_row(outcome: Outcome, number: int) -> dict[str, Any]:
-    """An observation, its number at each set, and its prediction if it was held out."""
+    """An observation, its number at each set, and its prediction if it was held out.
+
+    Numbers are in the ``unit`` of the row, and None where a number does not exist.
+    """
     observation = outcome.calibration.file.observations[number]
     unit, scale = observation.unit
     numbers: dict[str, float | None] = {}

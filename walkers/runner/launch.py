@@ -319,7 +319,7 @@ class _Watch:
     def run(
         self, command: Sequence[str], on_step: Callable[[int], None], keep_open: Sequence[int]
     ) -> EngineReport:
-        """Start an engine and watch it to its end; the arguments are as those of `launch`."""
+        """Start an engine and watch it to its end; the arguments are those of `launch`."""
         process = None
         try:
             with postponed_interrupts(), self.log.open("wb") as output:
@@ -399,7 +399,11 @@ class _Watch:
             self.last_line = words.rsplit(b"\n", 1)[-1]
 
     def _judge(self, status: _Status) -> failures.EngineFailure | None:
-        """The failure that a status line shows, given the line before; None if there is none."""
+        """The failure that a status line shows, given the line before; None if there is none.
+
+        Lost beads are a sign of a blow-up at a time step beyond its limits, and where even the
+        fastest bead could not have reached a face of the box.
+        """
         seconds = (status.step - self.step) * self.layout.time_step
         clearance = self.clearance
         nearest_was_top = self.nearest_is_top

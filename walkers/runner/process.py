@@ -132,9 +132,10 @@ def engine_environment(ranks: int) -> dict[str, str]:
 
 @contextmanager
 def postponed_interrupts() -> Iterator[None]:
-    """Delay signals to the end of the block.
+    """Delay signals that end the program to the end of the block.
 
-    In `subprocess.Popen`, they would leave an engine behind of which nobody knows.
+    A signal within `subprocess.Popen` could leave behind an engine that nobody ends. Only the main
+    thread receives signals; in other threads nothing is delayed.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

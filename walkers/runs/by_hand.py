@@ -378,6 +378,8 @@ def _edited_case(
             f"{samples} equal parts: edit steps_per_cycle (a multiple of {samples}); "
             "time_step follows from it and the frequency"
         )
+    # The deck still has the spacing and the sampling of the case for which it was written. From the
+    # edited values, the case would choose others.
     for key, walkers in case.walkers_by_key.items():
         edited_case = edited_case.with_value_at(f"{key}.spacing", walkers.spacing)
     run = edited_case.run.with_values(

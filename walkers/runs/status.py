@@ -62,6 +62,9 @@ def worst_status(points: Iterable[str]) -> str:
 def state_at(place: Path, directory: Path | None = None) -> PointState:
     """State of the run that belongs in a place.
 
+    A run that is neither finished, running nor failed is ``missing``, with a message on how much of
+    it is done if it was interrupted.
+
     Parameters
     ----------
     place

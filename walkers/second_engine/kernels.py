@@ -414,7 +414,7 @@ def separation(constants: Constants, state: State, i: int, j: int) -> tuple[Vect
         normal = (arm[0] / distance, arm[1] / distance, arm[2] / distance)
         return normal, distance - (radius + constants.radius[j])
     arm = add_scaled(position, -1.0, vector(constants.wall_point[wall]))
-    if constants.cylinder_radius[wall] == 0.0:
+    if constants.cylinder_radius[wall] == 0.0:  # a plane
         normal = vector(constants.wall_normal[wall])
         return normal, dot(arm, normal) - radius
     axis_distance = sqrt(arm[0] ** 2 + arm[1] ** 2)
