@@ -167,7 +167,10 @@ def summarise(case: Case) -> dict[str, Any]:
 
 
 def _beads(case: Case) -> dict[str, Any]:
-    """Numbers, mass (kg) and volume (m³) of the beads, their liquid (m³), and their softness."""
+    """Numbers, mass (kg) and volume (m³) of the beads, their liquid (m³), and their softness.
+
+    The last is the reduced over the real Young's modulus; None if the library does not have it.
+    """
     volume = _volume(case)
     materials = library_of(case.document).numbers("materials", case.beads.material or "")
     modulus = materials.get("youngs_modulus")

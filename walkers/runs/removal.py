@@ -121,7 +121,11 @@ def _abandoned_exports(out: Path, runs: Sequence[ListEntry]) -> list[Path]:
 
 
 def removal_text(removals: Sequence[Removal]) -> str:
-    """What is to be removed: a line each with the time since its last change; the total size."""
+    """What is to be removed, and its total size.
+
+    Each of the first `_MOST_LINES` removals has a line with the time since its last change. Of a
+    symbolic link, only the link is removed, which has no size.
+    """
     now = time.time()
     lines = []
     numbers = Counter[str]()

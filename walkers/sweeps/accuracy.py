@@ -68,7 +68,7 @@ def measure_accuracy(
     directory
         Directory of a finished run of walkers, beside which the further runs are made.
     options, engine, on_progress
-        As of `walkers.sweeps.scheduler.run_sweep`.
+        As for `walkers.sweeps.scheduler.run_sweep`.
 
     Returns
     -------
@@ -137,6 +137,9 @@ def _check_is_current(case: Case, directory: Path, engine: str | None) -> None:
 
 def modulus_factors(case: Case) -> Sequence[float]:
     """Possible Young's moduli, divided by the modulus of the case, in ascending order.
+
+    They are those of `_MODULUS_FACTORS` up to `STIFFEST`, the largest modulus of a case, and this
+    one too if it is well above the others. The first one, 1, is the case itself.
 
     Raises
     ------

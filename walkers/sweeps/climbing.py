@@ -146,7 +146,7 @@ def climb_summary(
     Parameters
     ----------
     piles, climbs
-        As of `climb_statistics`.
+        As for `climb_statistics`.
     within
         Time in s up to which climbs count, and by which a pile has climbed or not. None: all climbs
         count, and the time is the end of the shortest run without a climb, the longest time at
@@ -273,7 +273,7 @@ def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:
     Parameters
     ----------
     piles, climbs
-        As of `climb_statistics`.
+        As for `climb_statistics`.
 
     Returns
     -------

@@ -157,7 +157,7 @@ def _default_x(factors: Sequence[Factor], rows: pd.DataFrame) -> list[Factor]:
 def _hidden_factors(
     unplaced: Sequence[Factor], factors: Sequence[Factor], layout: FigureLayout
 ) -> list[Factor]:
-    """The factors that a figure does not show.
+    """The factors that a figure does not show, and that do not follow from those that it shows.
 
     Parameters
     ----------

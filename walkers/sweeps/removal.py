@@ -112,7 +112,7 @@ def _removal_of(
     removed
         Names of all runs and sweeps that are removed.
     runs_of_sweeps
-        As of `_with_members`.
+        As for `_with_members`.
 
     Raises
     ------

@@ -249,7 +249,19 @@ def run_spread(  # noqa: PLR0913
     points
         Number of draws, see `spread_sweep`.
     engine, on_progress
-        As of `walkers.sweeps.scheduler.run_sweep`.
+        As for `walkers.sweeps.scheduler.run_sweep`.
+
+    Returns
+    -------
+    Spread
+        The bands, with the failures and the warnings of the draws.
+
+    Raises
+    ------
+    InputError
+        As by `spread_sweep`.
+    EngineFailure, SweepStopped
+        As by `walkers.sweeps.scheduler.run_sweep`.
 
     Notes
     -----
