@@ -25,11 +25,11 @@ from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
-from walkers.physics.bridge import Surfaces
+from walkers.physics.bridge import Surfaces, UnusableLawError
 from walkers.physics.laws import LAWS
 from walkers.runner.binary import find_engine
 from walkers.runner.run_directory import run_place
-from walkers.templates.bridge_tables import TOLERANCE, RecordedLaw, tabulated
+from walkers.templates.bridge_tables import TOLERANCE, RecordedLaw, bridge_tables, tabulated
 from walkers.templates.deck import (
     BEADS_NAME,
     CONTENT_VERSION,
@@ -287,6 +287,33 @@ def test_the_engine_reads_the_law_out_of_its_table(name: str, other_radius: floa
     scale = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max(axis=0))
     error = np.abs(forces - expected)
     np.testing.assert_array_less(error, 20.0 * TOLERANCE * scale + 1e-30)
+
+
+@pytest.mark.parametrize("other_radius", [inf, 2e-4], ids=["wall", "beads"])
+def test_a_recorded_law_has_the_forces_of_each_volume(other_radius: float) -> None:
+    """Where liquid is conserved, the tables of two surfaces differ in their volume alone."""
+    case = brief_pile().with_value_at("liquid.conserved", True)
+    liquid = case.liquid.of_bridges
+    sizes = {(1, 2e-4), (1, 3e-4)}
+    recorded_law = RecordedLaw(bridge_tables([(case.contact, liquid)], sizes), None)
+    surfaces = Surfaces.between(3e-4, other_radius, liquid, case.contact.roughness)
+    assert len(surfaces.volumes) > 1
+    for with_volume in surfaces.volumes:
+        expected = case.law(with_volume)
+        curve = recorded_law(with_volume)
+        assert curve.rupture == expected.rupture
+        gap = np.array([0.5 * curve.rupture])
+        pull = expected.forces(gap).pull
+        np.testing.assert_allclose(curve.forces(gap).pull, pull, rtol=1e-3)
+
+
+def test_a_recorded_law_refuses_a_volume_that_the_run_did_not_have() -> None:
+    case = brief_pile().with_value_at("liquid.conserved", True)
+    liquid = case.liquid.of_bridges
+    recorded_law = RecordedLaw(bridge_tables([(case.contact, liquid)], {(1, 3e-4)}), None)
+    surfaces = Surfaces.between(3e-4, inf, liquid, case.contact.roughness)
+    with pytest.raises(UnusableLawError, match="none of this volume"):
+        recorded_law(replace(surfaces, volume=1.1 * surfaces.volume))
 
 
 # --- a law of the user's, as a run records it -------------------------------------------------

@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import inf, log2
+from math import inf, isclose, log2
 
 import numpy as np
 
@@ -276,6 +276,10 @@ def _table_text(law: BridgeLaw, surfaces: Surfaces, tolerance: float) -> str:
     return tabulated(law, surfaces, tolerance).text()
 
 
+_SAME_VOLUME = 1e-6
+"""Relative difference below which two volumes are the same: one step between volumes is √2."""
+
+
 @dataclass(frozen=True)
 class RecordedLaw:
     """A user's law as a run has recorded it; the user's file is not executed.
@@ -299,13 +303,34 @@ class RecordedLaw:
         return hashlib.sha256(self.source).hexdigest()
 
     def __call__(self, surfaces: Surfaces) -> Curve:
-        """The curve of two surfaces; raises `UnusableLawError` if the run has no such bridge."""
+        """The curve of two surfaces and the volume of their bridge.
+
+        Atom types are not compared: all beads of a run have the same surface and liquid.
+
+        Raises
+        ------
+        UnusableLawError
+            If the run has recorded no bridge between such surfaces, or none of this volume.
+        """
         for table in self.tables.split("\nbridge ")[1:]:
             head, text = table.split("\nrange ")
-            radii = [float(word) for word in head.split()[2:4]]
-            if radii == [surfaces.radius, surfaces.other_radius]:
+            if _is_head_of(head, surfaces):
                 return _recorded_curve(text)
-        raise UnusableLawError("the run has recorded no bridge between surfaces of these radii")
+        raise UnusableLawError(
+            "the run has recorded no bridge between surfaces of these radii, or none of this volume"
+        )
+
+
+def _is_head_of(head: str, surfaces: Surfaces) -> bool:
+    """Whether the head of a table, without the word ``bridge``, is that of two surfaces."""
+    first_line, _, liquid_line = head.partition("\n")
+    _, _, *radii = first_line.split()  # after two atom types, the smaller radius first
+    if [float(radius) for radius in radii] != [surfaces.radius, surfaces.other_radius]:
+        return False
+    if not liquid_line:  # without conserved liquid, the radii determine the volume
+        return True
+    _, volume, *_ = liquid_line.split()  # shares and films follow
+    return isclose(float(volume), surfaces.volume, rel_tol=_SAME_VOLUME)
 
 
 @lru_cache(maxsize=256)
