@@ -46,7 +46,10 @@ def cache_folder() -> Path:
 
 
 def make_cache_folder(name: str = "") -> Path:
-    """Make the folder of the cache, or a folder in it, which nobody but the user can enter.
+    """Make the folder of the cache, or a folder in it, which only the user and root can write.
+
+    A new folder is also closed to reading by others. A folder in the cache that others could have
+    written is removed and made anew (`secure_cache` does the same with the whole cache).
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ class Parameter(ConfigTable):
     """
 
     keys: Names
-    log: bool = False
+    log: bool = False  # before `range` and `normal`, whose check needs it
     range: tuple[Number, Number] = Field(examples=[[0.05, 0.5]])
     unit: str = ""
     experiments: Names | None = None
@@ -63,17 +63,21 @@ class Parameter(ConfigTable):
 
     @field_validator("range", "normal")
     @classmethod
-    def _check_numbers(
+    def _check_range_and_normal(
         cls, value: tuple[float, float] | None, validation: ValidationInfo
     ) -> tuple[float, float] | None:
-        """Refuse a range that is not in order, and magnitudes whose logarithm does not exist."""
+        """Refuse a range that is not in order, and numbers that have no logarithm.
+
+        With ``log``, the smallest value of a range, or the median of a normal prior, must be above
+        zero. The type of ``normal`` ensures that its standard deviation is.
+        """
         if value is None:
             return None
         first, second = value
         if validation.field_name == "range" and first >= second:
             raise ValueError("expected a smaller and a larger number")
         if validation.data.get("log") and first <= 0.0:
-            raise ValueError("expected numbers above zero: log is that of magnitudes")
+            raise ValueError("expected numbers above zero, because log = true")
         return value
 
     @property
@@ -265,6 +269,8 @@ class Calibration:
                 ]
         for_all_points = flatten(self.file.set)
         columns = {}
+        # All points have the same keys (`_problems_of_keys` refuses others). Their values already
+        # contain those of [set], so a key that varies between points must not be set a second time.
         for key in points[0]:
             columns[key] = [point[key] for point in points]
             for_all_points.pop(key, None)

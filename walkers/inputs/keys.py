@@ -96,7 +96,8 @@ def settings_of(words: Iterable[str]) -> dict[str, Value]:
     Raises
     ------
     InputError
-        If a word is not of this form, or a key is given twice.
+        If a word is not of this form, or a key is given twice. The message names the option
+        ``--set`` as the source.
 
     Examples
     --------

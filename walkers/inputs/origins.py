@@ -96,14 +96,15 @@ class Origin:
 
 
 def text_of(value: Any, kind: QuantityKind | None = None) -> str:
-    """A value of a case as text, as a case file has it.
+    """A value of a case as text for people: lists without brackets, words without quotes.
 
     Parameters
     ----------
     value
         A number, a word, a list (written with commas) or a table (written by its keys).
     kind
-        The kind of quantity if numbers are in SI units; None for pure numbers.
+        The kind of quantity if numbers are in SI units; None for pure numbers. Numbers within a
+        table are written without a unit, because its keys have different kinds of quantities.
     """
     if isinstance(value, (list, tuple)):
         texts = []

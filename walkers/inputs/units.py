@@ -171,7 +171,10 @@ def parse_quantity(text: str, kind: QuantityKind) -> float:
 
 
 def _factor_of(symbol: str, kind: QuantityKind) -> float:
-    """The value of a unit in the SI unit of a kind; `ValueError` for a unit of another kind."""
+    """The value of a unit in the SI unit of a kind; `ValueError` for a unit of another kind.
+
+    It is 1 for kelvins and degrees Celsius, whose zero points are in `_ZEROS`.
+    """
     if kind.unit == TEMPERATURE.unit and symbol in _ZEROS:
         return 1.0
     usual = _USUAL.get(symbol)

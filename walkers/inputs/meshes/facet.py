@@ -103,7 +103,12 @@ class Facet(NamedTuple):
         return ""
 
     def file_rows(self) -> str:
-        """Its line in the file of facets, followed by a line for each of its cells."""
+        """Its lines in the file of facets, which the engine reads; lengths in m.
+
+        The first line has the kind, the point and the direction (three numbers each) and the number
+        of cells. A line for each cell follows: the number of its half-spaces, and for each of them
+        its point, its direction and its bound, seven numbers.
+        """
         place = f"{numbers_text(self.point)}  {numbers_text(self.direction)}"
         lines = [f"{self.kind} {place}  {len(self.cells)}\n"]
         for cell in self.cells:

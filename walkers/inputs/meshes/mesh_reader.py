@@ -77,7 +77,10 @@ def _numpy_support() -> Any:
 
 
 def _points_of(dataset: Any) -> FloatArray:
-    """The points of a VTK dataset, shape (P, 3)."""
+    """The points of a VTK dataset in the unit of its file, shape (P, 3).
+
+    Raises `NothingRead` if it has none.
+    """
     vtk_to_numpy = _numpy_support().vtk_to_numpy
 
     points = dataset.GetPoints()
@@ -87,7 +90,7 @@ def _points_of(dataset: Any) -> FloatArray:
 
 
 def shortest_decimals(points: npt.NDArray[Any]) -> FloatArray:
-    """Points in double precision.
+    """Points of single or double precision in double precision, of the same shape.
 
     Numbers of single precision are read as the shortest decimals that name them: 2.65 of a binary
     STL file is 2.65 and not 2.6500000953674316.
@@ -131,7 +134,10 @@ def _check_precision(path: Path, points: FloatArray) -> None:
 
 
 def _check_indices(groups: Iterable[npt.NDArray[np.int64]], count: int) -> None:
-    """Refuse polygons whose corners are not among the points, of which there are ``count``."""
+    """Raise `ValueError` for polygons with corners that are not among ``count`` points.
+
+    Corners are numbered from 0 here, and from 1 in the message.
+    """
     for group in groups:
         wrong = group[(group < 0) | (group >= count)]
         if wrong.size:

@@ -426,6 +426,7 @@ def _basin(solid: Vessel, points: frozenset[int], level: float) -> _Basin:
     if not low:
         return _Basin(low, level, 0.0, 0.0)
     piece = Vessel(solid.points, solid.triangles[np.isin(solid.triangles, list(low)).any(axis=1)])
+    # The part below the level remains.
     below = piece.surface.clip("z", origin=(0.0, 0.0, level)).triangulate()
     corners = np.asarray(below.points)[below.regular_faces]
     area_vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -443,13 +444,14 @@ def _same_point_distance(solid: Vessel) -> float:
 def _inner_skin(solid: Vessel, basin: _Basin) -> Vessel:
     """The surface of a hollow up to the level at which it overflows.
 
-    What is above this level is cut off, so that the rim is level. Raises `ValueError` if the
-    remaining surface is not that of a vessel.
+    What is above this level is cut off, so that the rim is level. Raises `InputError` if the
+    remaining surface is not that of a vessel (`_consistent`).
     """
     within = np.isin(solid.triangles, list(basin.points)).any(axis=1)
     skin = _restricted(solid, solid.triangles[within])
     if skin.points[:, 2].max() <= basin.level + _same_point_distance(solid):
         return skin
+    # The part below the level remains.
     cut = skin.surface.clip("z", origin=(0.0, 0.0, basin.level)).triangulate()
     triangles = np.asarray(cut.regular_faces, dtype=np.int64)
     return _consistent(Vessel(*merged(np.asarray(cut.points, dtype=float), triangles)))

@@ -50,6 +50,8 @@ _UPRIGHT = 1e-3
 """Largest vertical component of the unit normal of an upright face."""
 _WITH_BORDER = -3e-308
 """Bound of a half-space that contains its border: an offset of zero is above this bound."""
+_NO_DIRECTION = (0.0, 0.0, 0.0)
+"""Direction of the facet of a corner, which has none."""
 _OVERLAPPING = -1e-12
 """Bound of half-spaces of neighbouring triangles of a face, which overlap, m."""
 _NEAR = 0.3
@@ -242,9 +244,11 @@ class Vessel:
 
     @cached_property
     def facets(self) -> tuple[Facet, ...]:
-        """Its faces, the floor first, then the edges and corners that stand out."""
-        edges = list(self._edges())
-        return (*self._face_facets(), *edges, *self._corners(edges))
+        """Its faces, the floor first, then outstanding edges and those of the rim, and corners.
+
+        Only edges and corners that may have the nearest point of the surface for a bead are facets.
+        """
+        return (*self._face_facets(), *self._edge_facets(), *self._corner_facets())
 
     def _face_facets(self) -> Iterator[Facet]:
         """The faces, the floor first."""
@@ -292,8 +296,11 @@ class Vessel:
             edges.append(sides)
         return edges
 
-    def _edges(self) -> Iterator[Facet]:
-        """The edges that stand out."""
+    def _edge_facets(self) -> Iterator[Facet]:
+        """The edges that stand out toward the beads, and those of the rim.
+
+        The cell of an edge is between its ends, and beyond it as seen along each of its faces.
+        """
         edges = self._outstanding_edges()
         end_points = [self.points[list(self.ends(sides[0]))] for sides in edges]
         spans = [span_text(points[:, 2].tolist()) for points in end_points]
@@ -312,10 +319,11 @@ class Vessel:
         start, _ = self.ends(side)
         return HalfSpace(_vector(self.points[start]), _vector(-self._inwards[side]), 0.0)
 
-    def _corners(self, edges: Sequence[Facet]) -> Iterator[Facet]:
-        """Corners at the ends of edges that stand out."""
-        if not edges:
-            return
+    def _corner_facets(self) -> Iterator[Facet]:
+        """The corners at the ends of outstanding edges and of those of the rim.
+
+        A bead in the cell of a corner is nearer to it than to any other point of the edges there.
+        """
         neighbours: dict[int, set[int]] = defaultdict(set)
         for first, second in self.sides_at_edges:
             neighbours[first].add(second)
@@ -332,7 +340,7 @@ class Vessel:
             for neighbour in sorted(neighbours[corner]):
                 away = _vector(point - self.points[neighbour])
                 cell.append(HalfSpace(_vector(point), away, _WITH_BORDER))
-            yield Facet("corner", _vector(point), (0.0, 0.0, 0.0), (tuple(cell),), name)
+            yield Facet("corner", _vector(point), _NO_DIRECTION, (tuple(cell),), name)
 
     # --- the opening, and what is within --------------------------------------------------------
 

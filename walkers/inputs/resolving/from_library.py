@@ -144,7 +144,9 @@ def _unknown_names(
 
 
 def _composition(document: Mapping[str, Any], liquid: str | None) -> Composition | None:
-    """The composition of a liquid whose numbers depend on it; None for other liquids.
+    """Mass fraction and temperature (K) of a liquid that is a mixture; None for other liquids.
+
+    The temperature is 20 °C unless the document gives it.
 
     Raises
     ------
@@ -152,21 +154,24 @@ def _composition(document: Mapping[str, Any], liquid: str | None) -> Composition
         If the mass fraction is missing or is not a number from 0 to 1, if the temperature is not a
         temperature, or if a liquid that is no mixture has either of them.
     """
-    share = value_at(document, parts_of(_MASS_FRACTION))
+    mass_fraction = value_at(document, parts_of(_MASS_FRACTION))
     temperature = value_at(document, parts_of(_TEMPERATURE))
     if liquid not in MIXTURES:
-        _check_no_composition({_MASS_FRACTION: share, _TEMPERATURE: temperature})
+        _check_no_composition({_MASS_FRACTION: mass_fraction, _TEMPERATURE: temperature})
         return None
-    if type(share) not in (int, float) or not 0 <= share <= 1:
+    # Not isinstance: true and false are no numbers here.
+    is_number = type(mass_fraction) in (int, float)
+    if not is_number or not 0 <= mass_fraction <= 1:
+        # All `MIXTURES` are of glycerol and water.
         message = "expected the mass of the glycerol over that of the mixture, such as 0.87"
-        if share is MISSING:
+        if mass_fraction is MISSING:
             message = f"missing; {message}"
         raise key_error(_MASS_FRACTION, message)
     text = str(temperature)
     if temperature is MISSING:
         text = _DEFAULT_TEMPERATURE
     try:
-        return Composition(float(share), parse_quantity(text, TEMPERATURE))
+        return Composition(float(mass_fraction), parse_quantity(text, TEMPERATURE))
     except ValueError as error:
         raise key_error(_TEMPERATURE, str(error)) from error
 

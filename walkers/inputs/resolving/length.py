@@ -22,6 +22,8 @@ from walkers.rounding import percent
 
 _ROUNDING = 1e-9
 """Rounding error of a number of cycles, and relative one of a duration."""
+_ROUNDING_OF_DURATION = 1e-12
+"""Relative rounding error of a duration times a frequency."""
 MOST_STEPS = 2**31 - 1
 """Largest number of time steps of a run: the engine counts them with 32 bits."""
 _SEGMENT_SECONDS = 0.5
@@ -176,13 +178,16 @@ def cycles_of(table: RunTable, drive: Excitation, cycles_per_sample: int) -> int
     cycles_per_sample
         Cycles between samples, at least 1.
     """
-    fewest, most = drive.cycle_limits
+    # 0 without a ramp, and infinite without a record that ends.
+    cycles_of_ramp, cycles_in_record = drive.cycle_limits
     cycles_of_record = 0
     if drive.ends:
-        cycles_of_record = floor((most + _ROUNDING) / cycles_per_sample) * cycles_per_sample
+        samples_of_record = floor((cycles_in_record + _ROUNDING) / cycles_per_sample)
+        cycles_of_record = samples_of_record * cycles_per_sample
     if table.duration is not None:
         # A duration of whole samples must not give one more because of a rounding error.
-        samples = ceil(table.duration * drive.frequency * (1.0 - 1e-12) / cycles_per_sample)
+        cycles_of_duration = table.duration * drive.frequency * (1.0 - _ROUNDING_OF_DURATION)
+        samples = ceil(cycles_of_duration / cycles_per_sample)
         cycles = samples * cycles_per_sample
         if drive.ends and table.duration <= drive.length * (1.0 + _ROUNDING):
             cycles = min(cycles, cycles_of_record)
@@ -191,8 +196,8 @@ def cycles_of(table: RunTable, drive: Excitation, cycles_per_sample: int) -> int
         needed = table.cycles
     elif table.most_cycles:
         needed = table.most_cycles
-    elif fewest > 0.0:
-        needed = ceil(fewest)
+    elif cycles_of_ramp > 0.0:
+        needed = ceil(cycles_of_ramp)
     elif drive.ends:
         return cycles_of_record
     else:

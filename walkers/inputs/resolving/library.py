@@ -152,7 +152,8 @@ class Library:
             computed = _properties_of_mixture(name, composition or HALF)
             numbers = {}
             for key, entry in entries.items():
-                # A value that is written in the file comes before a computed one.
+                # Entries of mixtures have a source but no value: these values are computed. A value
+                # that is written in the file comes before a computed one.
                 numbers[key] = _number({"value": computed.get(key), **entry}, collection)
             return numbers
         return {}

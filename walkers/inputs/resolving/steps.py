@@ -148,7 +148,8 @@ def _dimer(file: CaseFile, drafts: Mapping[str, WalkerDraft]) -> Dimer | None:
 def _liquid(liquid: LiquidTable, notes: Notes) -> Liquid:
     """The liquid with its dynamic viscosity, Pa s.
 
-    The table has one of both viscosities; the kinematic one is in m²/s, the density in kg/m³.
+    The table gives either the dynamic or the kinematic viscosity (m²/s). The latter is multiplied
+    by the density (kg/m³), and refused without one.
     """
     viscosity = liquid.dynamic_viscosity
     if liquid.kinematic_viscosity is not None:
