@@ -35,7 +35,7 @@ from walkers.physics.capillary import (
 )
 from walkers.physics.laplace import force_curve, rupture_distance
 from walkers.physics.laws import LAWS, rabinovich, willett, young_laplace
-from walkers.physics.time_step import FRACTIONS
+from walkers.physics.time_step import recommended_fractions
 from walkers.runs.preview import summarise
 
 pytestmark = pytest.mark.filterwarnings("ignore::walkers.inputs.bridge_laws.ExecutedLawWarning")
@@ -982,7 +982,7 @@ def test_the_viscous_limit_is_of_no_less_than_bridges_resist(law: str) -> None:
 
 @pytest.mark.parametrize("loose", [True, False], ids=["loose beads", "walkers"])
 def test_auto_takes_at_most_half_of_each_limit(loose: bool) -> None:
-    shares = FRACTIONS[loose]
+    shares = recommended_fractions(loose=loose)
     assert shares.keys() == vars(limits_of(make_case())).keys()
     assert min(shares.values()) > 0.0
     assert max(shares.values()) <= 0.5
@@ -1004,6 +1004,6 @@ def test_auto_is_the_longest_step_that_limits_allow(name: str, longest: float) -
     """
     case = load_case(name)
     limits = vars(limits_of(case))
-    shares = FRACTIONS[case.loose]
+    shares = recommended_fractions(loose=case.loose)
     allowed = min(longest, *[share * limits[limit] for limit, share in shares.items()])
     assert 0.97 * allowed < case.run.time_step <= allowed

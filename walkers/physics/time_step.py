@@ -33,11 +33,10 @@ from walkers.physics.contact import reduced_modulus
 if TYPE_CHECKING:  # numpy is not needed for a time step
     from walkers.physics.bridge import Roughness
 
-FRACTIONS: Mapping[bool, Mapping[str, float]] = {
-    True: {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4},
-    False: {"rayleigh": 0.4, "hertz": 0.2, "viscous": 0.4},
-}
-"""Largest share of each limit for ``"auto"``, with loose beads, of no walker (True), and without.
+FRACTIONS_OF_LOOSE_BEADS: Mapping[str, float] = {"rayleigh": 0.2, "hertz": 0.1, "viscous": 0.4}
+"""Largest share of each limit for ``"auto"`` with loose beads, which belong to no walker."""
+FRACTIONS_OF_WALKERS: Mapping[str, float] = {"rayleigh": 0.4, "hertz": 0.2, "viscous": 0.4}
+"""The same if all beads belong to walkers.
 
 At 0.4 of the viscous limit (2 µs for glycerol), the climber and the pile were converged. Walkers
 alone do not collide with each other: at 0.4 of the Rayleigh limit, velocities are within 0.25 % of
@@ -45,6 +44,19 @@ those at 0.05 (Figs. 1b, 2, 3, 4a, 4b); between 0.59 and 0.71 of the limit they 
 """
 LONGEST_WALKER_STEP = 4e-6
 """Longest step of walkers, whatever their stiffness, s."""
+
+
+def recommended_fractions(*, loose: bool) -> Mapping[str, float]:
+    """Largest share of each limit for ``"auto"``, by the names of the limits.
+
+    Parameters
+    ----------
+    loose
+        Whether there are loose beads, which belong to no walker.
+    """
+    if loose:
+        return FRACTIONS_OF_LOOSE_BEADS
+    return FRACTIONS_OF_WALKERS
 
 
 class BridgedBead(NamedTuple):
@@ -67,7 +79,7 @@ class TimeStepLimits:
     viscous: float
 
     def recommended(self, *, loose: bool) -> tuple[float, str]:
-        """Largest step within the shares (`FRACTIONS`) of all limits.
+        """Largest step within the shares (`recommended_fractions`) of all limits.
 
         Parameters
         ----------
@@ -84,12 +96,12 @@ class TimeStepLimits:
             most 4 us for walkers``.
         """
         steps = []
-        for name, share in FRACTIONS[loose].items():
+        for name, share in recommended_fractions(loose=loose).items():
             steps.append((share * getattr(self, name), f"{share:g} of the {name} limit"))
         if not loose:
             longest = LONGEST_WALKER_STEP
             steps.append((longest, f"at most {longest * 1e6:g} us for walkers"))
-        return min(steps)  # steps, and reasons only if two steps are equal
+        return min(steps)  # the smallest step; of equal ones, the first reason in the alphabet
 
     def exceeded_by(self, time_step: float) -> list[str]:
         """Names of the limits below ``time_step`` (s)."""

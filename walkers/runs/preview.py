@@ -18,7 +18,7 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.run import CONSTANT
 from walkers.inputs.units import ACCELERATION_OF_ONE_G, MODULUS, parse_quantity
 from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
-from walkers.physics.time_step import FRACTIONS
+from walkers.physics.time_step import recommended_fractions
 from walkers.rounding import counted, percent
 from walkers.runner.cost import PROGRAM_SECONDS, predicted_overhead, predicted_seconds
 from walkers.runner.process import cores_here
@@ -46,8 +46,8 @@ _LONGEST_IN_SECONDS = 120.0
 def notes(case: Case) -> list[str]:
     """What a user should know about a case before it is run.
 
-    Notes are about a long time step, heavy beads, records and few cores; for piles also about beads
-    of a single size and about low walls.
+    Notes are about a time step that is long or needlessly short, heavy beads, records and few
+    cores; for piles also about beads of a single size and about low walls.
     """
     lines = _time_step_notes(case)
     lines += gravity_warnings(case)
@@ -244,7 +244,7 @@ def _time_step(case: Case) -> dict[str, Any]:
         "step": step,
         "limits": limits,
         "share": shares,
-        "auto": dict(FRACTIONS[case.loose]),
+        "auto": dict(recommended_fractions(loose=case.loose)),
     }
 
 
@@ -264,7 +264,13 @@ def _run(case: Case) -> dict[str, Any]:
 
 
 def _vessel(case: Case) -> dict[str, Any]:
-    """A vessel: its walls, opening (m), height (m) and volume (m³)."""
+    """A vessel: its walls, opening, height (m) and volume (m³).
+
+    ``planes`` is the number of planes that are equivalent to the vessel, and 0 if there are none,
+    so that its ``triangles`` are the walls. ``triangles_of_file`` may differ: triangles of the mesh
+    that are no wall of the inside are left out. ``opening`` is the extent of the opening along x
+    and y, m; ``facing`` is the unit vector that points out of it, zero for a closed vessel.
+    """
     vessel = case.boundary.vessel
     mesh = case.document.get("meshes", {}).get(case.boundary.mesh or "")
     return {
@@ -368,7 +374,7 @@ def _text_of_beads(beads: Mapping[str, Any]) -> str:
 
 
 def _text_of_vessel(vessel: Mapping[str, Any]) -> str:
-    """Walls, opening, height and volume of a vessel."""
+    """Walls, opening, height and volume of a vessel, from the numbers of `_vessel`."""
     if vessel["planes"]:
         walls = counted(vessel["planes"], "plane")
     else:

@@ -66,9 +66,9 @@ _NODES_PER_WINDOW = 16
 _FEWEST_NODES = 4
 """Smallest number of nodes of this spline."""
 _UNEVEN_STEP = 1.5
-"""Longest time between two rows, in medians of all of them, unless single rows are lost."""
+"""Longest time between two rows, in medians of all such times, unless single rows are lost."""
 _LOST_STEP = 2.5
-"""Longest time between two rows between which one is lost, in medians of all of them."""
+"""Longest time between two rows between which one is lost, in medians of all such times."""
 _LARGEST_LOST_SHARE = 0.01
 """Largest number of lost rows, over that of all rows."""
 _LARGEST_REPEATED_SHARE = 0.05
@@ -128,7 +128,7 @@ class Record(ConfigTable):
 
     @cached_property
     def slow_course(self) -> PPoly | None:
-        """The slow part of the displacement along x, y and z, m, against time, s.
+        """The slow part of the displacement along x, y and z, m, against time as in `course`.
 
         None if the record repeats. The error of a sensor, integrated twice, grows to millimetres
         within a second. What changes slowly compared with four periods of the slowest line is no
@@ -140,10 +140,11 @@ class Record(ConfigTable):
         if self.repeats:
             return None
         count = len(self.rows)
-        width = int(min(_SLOW_WINDOW_PERIODS / self._periods_of_lines[0], 1.0) * count)
+        share_of_window = min(_SLOW_WINDOW_PERIODS / self._periods_of_lines[0], 1.0)
+        rows_in_window = int(share_of_window * count)
         time = np.linspace(0.0, self.length, count)
-        slow = slow_part(self.course(time), width)
-        node_count = _FEWEST_NODES + _NODES_PER_WINDOW * count // width
+        slow = slow_part(self.course(time), rows_in_window)
+        node_count = _FEWEST_NODES + _NODES_PER_WINDOW * count // rows_in_window
         nodes = np.unique(np.linspace(0, count - 1, node_count).astype(np.int64))
         return CubicSpline(time[nodes], slow[nodes])
 
@@ -408,17 +409,22 @@ class Record(ConfigTable):
 
     @property
     def notes(self) -> list[str]:
-        """What a user should know of a record before it is run, in words."""
+        """What a user should know of a record before it is run, in words.
+
+        Notes are about columns that are left out, rows that are lost, an amplitude that no shaker
+        has, and the `doubts` about the offset.
+        """
         notes = []
         if self.ignored_columns:
             columns = "columns that are no acceleration along x, y or z"
             names = ", ".join(f'"{name}"' for name in self.ignored_columns)
             notes.append(f"drive.record: {columns} are left out: {names}")
+        # Each gap is of a single row: `_check_times` has refused longer ones.
         lost = int(np.sum(_are_gaps(np.array(self.rows)[:, 0])))
         if lost:
             rows = counted(lost, "row")
             notes.append(f"drive.record lacks {rows}: the spline goes over the gaps")
-        amplitude = self.largest(0)
+        amplitude = self.largest(order=0)
         if not _SMALLEST_DISPLACEMENT < amplitude < _LARGEST_DISPLACEMENT:
             frequency = f"{self.frequencies[0]:.4g} Hz"
             size = f"{frequency} and an amplitude of {amplitude:.2g} m"
@@ -535,7 +541,10 @@ def _row_of(row: Sequence[Any]) -> tuple[float, float, float, float]:
 
 
 def _are_gaps(time: FloatArray) -> BoolArray:
-    """Whether at least one row is lost between two successive ones, shape (N - 1,)."""
+    """Whether at least one row is lost between two successive ones, shape (N - 1,).
+
+    `_check_times` allows gaps of one lost row alone.
+    """
     steps = np.diff(time)
     return np.asarray(steps > _UNEVEN_STEP * np.median(steps))
 
@@ -589,7 +598,10 @@ def _check_resolution(rows: FloatArray) -> None:
 
 
 def _check_times(time: FloatArray) -> None:
-    """Raise `ValueError` for times, s, shape (N,), that do not increase evenly."""
+    """Raise `ValueError` for times, s, shape (N,), that do not increase evenly.
+
+    Single lost rows, up to 1 % of all rows, are accepted. Messages number rows from 1.
+    """
     steps = np.diff(time)
     if (steps < 0.0).all():
         raise ValueError(
@@ -608,7 +620,7 @@ def _check_times(time: FloatArray) -> None:
     if lost.sum() <= _LARGEST_LOST_SHARE * len(time):
         uneven &= ~lost
     if uneven.any():
-        first = np.argmax(uneven)
+        first = np.argmax(uneven)  # a step; it ends at the row first + 1 from 0
         problem = f"row {first + 2} is {1e3 * steps[first]:.6g} ms after the one before"
         expected = "expected times that increase without gaps"
         raise ValueError(f"{problem}; {expected}, about {1e3 * usual_step:.6g} ms apart")

@@ -1,6 +1,10 @@
 """Loads of the contacts of beads at rest, and how far walkers move from their starts.
 
 The laws themselves are in `walkers.physics`: here they are applied to the beads of a case.
+
+*Loose beads* belong to no walker: they are placed one by one, or poured as a mixture. The *delay*
+of a contact is the phase (rad) by which its overlap lags behind a changing load, because the bridge
+damps it (`delay_of_walkers`). It grows with the softness of the beads.
 """
 
 from __future__ import annotations
@@ -25,8 +29,8 @@ DELAY_LIMIT = 0.025
 _NOTICED_DELAY = 0.1
 """Smallest delay of loose beads at which a result warns of their softness, rad."""
 _MEASURED_DELAYS = (0.0, 0.13, 0.34, 1.5, 3.8)
-"""Delays of the shipped climbers, rad: with glycerol 87 % at 200 and 50 MPa, with glycerol at 200
-and 50 MPa."""
+"""Delays of the shipped climbers, rad: none of rigid beads; then with glycerol 87 % at 200 and
+50 MPa, and with glycerol at 200 and 50 MPa."""
 _MEASURED_ERRORS = (0.0, 0.03, 0.09, 0.15, 1.3)
 """Relative errors of the speed of climbing at these delays: the largest for a diamond, a dimer
 and a cluster in a corner, compared with beads of 12.8 GPa. At the last delay, the dimer goes
@@ -129,14 +133,14 @@ def softness_warning(case: Setup) -> str | None:
     str or None
         A sentence; None for a delay below 0.1 rad.
     """
-    phase = delay_of_loose_beads(case)
-    if phase < _NOTICED_DELAY:
+    delay = delay_of_loose_beads(case)
+    if delay < _NOTICED_DELAY:
         return None
-    problem = f"soft beads: bridges delay contacts by {phase:.2g} rad"
-    if phase > _MEASURED_DELAYS[-1]:
+    problem = f"soft beads: bridges delay contacts by {delay:.2g} rad"
+    if delay > _MEASURED_DELAYS[-1]:
         error = "wrong, even in their direction (set a higher contact.youngs_modulus)"
     else:
-        percentage = 100.0 * float(np.interp(phase, _MEASURED_DELAYS, _MEASURED_ERRORS))
+        percentage = 100.0 * float(np.interp(delay, _MEASURED_DELAYS, _MEASURED_ERRORS))
         error = f"up to {percentage:.0f} % off those of hard beads (contact.youngs_modulus)"
     return f"{problem}; the speeds of climbing clusters are then {error}"
 

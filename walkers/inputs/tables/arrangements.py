@@ -2,8 +2,10 @@
 
 An arrangement of `ARRANGEMENTS` gives the places of the beads of a cluster in the frame of the
 walker, seen from above. The first axis of this frame points where the walker is to face, the second
-to its left. Beads are numbered in the order of the case; the origin is the point over which the
-first two touch. Where walkers start is the subject of `walkers.inputs.resolving.standing`.
+to its left. Beads are numbered in the order of the case. The origin is the point over which the
+first two touch; that of a ring is its centre. In a fan of three or more beads and in a diamond, it
+is where the first two would touch if the second stood straight behind the first. Where walkers
+start is the subject of `walkers.inputs.resolving.standing`.
 """
 
 from __future__ import annotations
@@ -105,10 +107,12 @@ def _diamond(radii: Sequence[float], distance: TouchingDistance) -> Places:
 
 
 def _ring(radii: Sequence[float], distance: TouchingDistance) -> Places:
-    """All on a circle, each touching the next, the first one in front."""
+    """Centres on a circle around the origin; each bead touches the next, the first is in front."""
     number = len(radii)
     chords = [distance(bead, (bead + 1) % number) for bead in range(number)]
     smallest_radius = max(chords) / 2.0
+    # The chords close where their angles add up to 2π. The angles shrink as the radius grows, so
+    # that a sum below 2π at the smallest radius remains below.
     if sum(_angles_of_chords(chords, smallest_radius)) < 2.0 * pi:
         raise ValueError(
             "these beads do not form a closed ring; expected more beads, or more similar radii"
