@@ -25,6 +25,7 @@ from walkers.runner.model_sources import model_sources
 from walkers.runner.run_directory import SEGMENTS, case_of, name_of
 from walkers.runs.making import DECK_FOLDER
 from walkers.sweeps.record import RECORD_NAME, SweepRecord, read_sweep_record, states
+from walkers.sweeps.table import encoded, load_table
 from walkers.templates.deck import BRIDGES_NAME, DECK_NAME
 
 RECORD_FILE = "archive.json"
@@ -258,22 +259,29 @@ class _Packing:
         return left_out
 
     def add_sweep(self, record: SweepRecord, name: str) -> list[str]:
-        """Add a sweep under a name, its table and its finished runs.
+        """Add the record, the table and the file of a sweep, and its finished runs.
+
+        Parameters
+        ----------
+        record
+            The record of the sweep.
+        name
+            Name of the folder of the sweep in the archive, and of the sweep file in it.
 
         Returns
         -------
         list of str
-            The folders of the runs in the archive.
+            The folders of the runs in the archive, each once. Points without a finished run have
+            none.
         """
-        from walkers.sweeps.table import encoded, load_table
-
         place = f"{RUNS_FOLDER}/{name}"
         table = load_table(record.directory)
         table["run"] = [_place_of(run) for run in table["run"]]
         self.add(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)
         for form in ("csv", "parquet"):
             self.add(f"{place}/table.{form}", encoded(table, form))
-        self.add(f"{place}/{name}.toml", toml_bytes(record.sweep.file))
+        tables_of_file = record.sweep.file
+        self.add(f"{place}/{name}.toml", toml_bytes(tables_of_file))
         runs: dict[str, None] = {}
         for state in states(record):
             if state.status == "finished" and state.directory:

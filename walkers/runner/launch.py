@@ -382,25 +382,30 @@ class _Watch:
         self.bytes_of_output = bytes_of_output
 
     def _take_in(self, lines: bytes) -> None:
-        """Keep from lines of the log what is needed later."""
+        """Update what is known of the run from whole lines of the log.
+
+        That is the version, the first error, the first failure, what the last status line has, the
+        time of the last loop (s), and the last line with text.
+        """
         if self.version is None:
             self.version = version_in(lines)
         error = _ERROR_LINE.search(lines)
         if error is not None and not self.error:
             self.error = error[0].strip()
         for match in _STATUS_LINE.finditer(lines):
-            failure = self._judge(_Status.of_line(match))
+            failure = self._follow(_Status.of_line(match))
             self.failure = self.failure or failure
         loop_times = _LOOP_TIME.findall(lines)
         if loop_times:
             self.loop_seconds = float(loop_times[-1])
-        words = lines.strip()
-        if words:
-            self.last_line = words.rsplit(b"\n", 1)[-1]
+        text = lines.strip()
+        if text:
+            self.last_line = text.rsplit(b"\n", 1)[-1]
 
-    def _judge(self, status: _Status) -> failures.EngineFailure | None:
-        """The failure that a status line shows, given the line before; None if there is none.
+    def _follow(self, status: _Status) -> failures.EngineFailure | None:
+        """Store the step and the clearance of a status line, and return the failure that it shows.
 
+        Step and clearance of the line before are needed for that. None if there is no failure.
         Lost beads are a sign of a blow-up at a time step beyond its limits, and where even the
         fastest bead could not have reached a face of the box.
         """

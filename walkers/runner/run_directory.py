@@ -517,15 +517,15 @@ def locked(places: Iterable[Path]) -> Iterator[Mapping[Path, int]]:
 def recomputed(directory: Path, names: Collection[str]) -> Iterator[None]:
     """Record in the manifest of a finished run that a ``with`` block recomputes files.
 
-    During the block, the run is locked, and the manifest has no checksums of the files: if the
-    process is killed, or the block raises an error, half-written files are not reported as damaged.
-    After the block, the manifest has their checksums and sizes, and under ``tabulated`` the program
-    and the time.
+    During the block, a finished run is locked, and its manifest has no checksums of the files: if
+    the process is killed, or the block raises an error, half-written files are not reported as
+    damaged. After the block, the manifest has their checksums and sizes, and under ``tabulated``
+    the program and the time.
 
     Parameters
     ----------
     directory
-        The run directory; without a manifest, nothing is recorded.
+        The run directory; without a manifest, nothing is locked or recorded.
     names
         Paths of the files within the directory.
 

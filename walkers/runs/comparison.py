@@ -1,5 +1,9 @@
 """Comparison of two runs, or of two cases that were not run: parameters and results.
 
+The *main number* of a run is the most important of its results, such as the velocity. The *band* of
+a number contains the middle 90 % of its values as the uncertain values of the case vary within
+their ranges (`walkers.postprocess.measure.uncertainty`).
+
 The significance of a difference over many runs is not computed here; see `walkers.sweeps`.
 """
 
@@ -389,13 +393,15 @@ def _signed_difference(number: _ComparedNumber) -> str:
     return f"+{text}"
 
 
-def _error_lines(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]) -> list[str]:
-    """How certain the differences are.
+def _error_lines(
+    differing_numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]
+) -> list[str]:
+    """Lines on how certain the differences are; none if no velocity or main number differs.
 
-    How many times its numerical error a velocity differs; the bands of both runs, if their main
-    numbers differ; how to measure numerical errors that are missing.
+    They have the ratio of each velocity's difference to its numerical error, the bands of both runs
+    if their main numbers differ, and the command that measures numerical errors that are missing.
     """
-    number_by_name = {number.quantity: number for number in numbers}
+    number_by_name = {number.quantity: number for number in differing_numbers}
     velocities = [number_by_name[name] for name in _VELOCITIES if name in number_by_name]
     lines = []
     for number in velocities:
@@ -404,6 +410,7 @@ def _error_lines(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun
             lines.append(f"{number.quantity}: differs by {times} times its numerical error")
     if any(headline(run.results) in number_by_name for run in runs):
         lines += _band_lines(runs)
+    # The field of `not_computed` tells whether the numerical error is missing.
     unmeasured = [run for run in runs if not_computed(run.results).numerical_error]
     if velocities and unmeasured:
         directories = " ".join(str(run.results.directory) for run in unmeasured)

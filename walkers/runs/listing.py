@@ -158,12 +158,13 @@ def _without_directory(out: Path, listed: set[Path]) -> list[ListEntry]:
 def entry_of(path: Path) -> ListEntry | None:
     """The run in a directory; None if the directory is none that this program has made.
 
-    The directory must have a manifest or the name of a run. If its case cannot be read, it must
-    have the name of a run, and either a manifest, or the ending of the name of an unfinished run
-    and the files of one (`walkers.runner.run_directory.holds_unfinished`).
+    The directory must be that of a finished run, or have the name of a run. If its case cannot be
+    read, it must have the name of a run, and be a finished run or certainly an unfinished one.
     """
     place = place_of(path)
     has_final_name = path == place
+    # A manifest counts only in the final directory: a replaced run, which is not listed as
+    # finished, still has its own.
     finished = has_final_name and run_directory.is_finished(path)
     has_run_name = run_directory.is_run_name(place.name)
     if not finished and not has_run_name:
@@ -172,15 +173,19 @@ def entry_of(path: Path) -> ListEntry | None:
     if case is not None:
         case_name = case.name
         parameters = flattened(case)
-    else:
-        is_unfinished = not has_final_name and run_directory.holds_unfinished(path)
-        if not has_run_name or not (finished or is_unfinished):
-            return None
+    elif has_run_name and (finished or _is_certainly_unfinished(path)):
         case_name = _case_name_of(place)
         parameters = FlatCase()
+    else:
+        return None
     if finished:
         return _finished(path, case_name, parameters)
     return _unfinished(path, case_name, parameters)
+
+
+def _is_certainly_unfinished(path: Path) -> bool:
+    """Whether a directory has the ending of the name of an unfinished run, and the files of one."""
+    return path != place_of(path) and run_directory.holds_unfinished(path)
 
 
 def _case_name_of(place: Path) -> str:

@@ -188,6 +188,7 @@ def _progress_of_shared_deck(folder: Path) -> Progress:
 def _progress_of_segment(directory: Path, case: Case) -> Progress:
     """Progress of a run whose segments are made one by one; `ValueError` if none is being made."""
     done = _complete_segments(directory)
+    # `ValueError` unless there is exactly one: segments are made one after the other.
     (folder,) = (directory / run_directory.SEGMENTS).glob("*.new")
     run = case.run
     cycles = run.cycles
@@ -591,6 +592,7 @@ def _make_in_shared_decks(
     completed: list[str] = []
     if not left:
         return completed
+    # Cases that share a deck have the same attempts.
     attempts = next(iter(left.values())).run.attempts
     for cycles in attempts:
         if left:
@@ -613,7 +615,7 @@ def _make_together(
     attempted = {name: case.for_cycles(cycles) for name, case in cases.items()}
     deck = decks.compose(decks.plan_of(*attempted.values()))
     started = time.time()
-    first = next(iter(cases))
+    first = next(iter(cases))  # the deck is made in the directory of the first run
     incomplete = run_directory.unfinished(out / first)
     folder = incomplete / DECK_FOLDER
     shutil.rmtree(incomplete, ignore_errors=True)

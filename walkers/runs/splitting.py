@@ -76,6 +76,7 @@ def split_output(directory: Path, layout: DeckLayout, cases: Mapping[Path, Case]
     """
     dump = BinaryDump(directory / layout.bead_dump, layout.bead_columns)
     frames = dump.stack()
+    # Cases that share a deck have the same samples.
     samples_per_cycle = next(iter(cases.values())).run.samples_per_cycle
     lengths = []
     for case in cases.values():

@@ -230,7 +230,11 @@ def _quantities_of_pile(motion: Motion) -> list[ComparedQuantity]:
 
 
 def _quantities_of_loose_beads(motion: Motion) -> list[ComparedQuantity]:
-    """Mean velocity of the centre of mass of beads that are not in walkers."""
+    """Mean velocity of the centre of mass of placed beads, which are not in walkers.
+
+    The quantities are velocities, although their names are those of the position. That along z is
+    first: it is the speed of climbing.
+    """
     weights = motion.radius**3 / np.sum(motion.radius**3)
     displacement = weights @ (motion.position[-1] - motion.position[0])
     along_x, along_y, along_z = (1e3 * displacement / np.ptp(motion.time)).tolist()

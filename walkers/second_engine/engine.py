@@ -214,12 +214,25 @@ def _kernel_rows(case: Case, walls: Sequence[Wall]) -> list[KernelRow]:
 
 
 def _drive(case: Case) -> tuple[FloatArray, FloatArray]:
-    """The fields ``harmonics`` and ``inertial_acceleration`` of `Constants`."""
+    """The fields ``harmonics`` and ``inertial_acceleration`` of `Constants`.
+
+    They give the inertial acceleration of the beads in the frame of the walls, which is opposite to
+    the acceleration of the walls.
+
+    Returns
+    -------
+    harmonics : ndarray, shape (H, 6)
+        Direction (3 columns), angular frequency ω (rad/s), peak acceleration A (m/s²) and phase φ
+        (rad) of each A sin(ωt + φ); no rows for a drive with a ramp or from a record. The walls are
+        displaced along sin(ωt + φ), so that their own acceleration is −A sin(ωt + φ).
+    inertial_acceleration : ndarray, shape (steps + 1, 3)
+        At each step of a drive with a ramp or from a record, m/s²; otherwise no rows.
+    """
     if case.drive.ramp or case.drive.record:
         times = case.run.time_step * np.arange(case.run.steps + 1, dtype=np.float64)
         acceleration = np.zeros((len(times), 3))
         for direction, motion in case.excitation.motions(times):
-            _, _, wall_acceleration = motion
+            _, _, wall_acceleration = motion  # after displacement and velocity
             acceleration -= np.outer(wall_acceleration, direction)
         return np.zeros((0, 6)), acceleration
     harmonics = [

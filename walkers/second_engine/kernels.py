@@ -110,7 +110,7 @@ class Constants(NamedTuple):
         Gravity, m/s².
     harmonics : ndarray, shape (H, 6)
         Direction (3 columns), angular frequency (rad/s), peak acceleration (m/s²) and phase (rad).
-    inertial_acceleration : ndarray, shape (steps, 3)
+    inertial_acceleration : ndarray, shape (steps + 1, 3)
         Inertial acceleration at each step, m/s², of a drive with a ramp or from a record, which
         then has no harmonics; otherwise no rows.
     modulus, shear_modulus : float

@@ -348,7 +348,10 @@ def _counts_of_outcomes(
 
 
 def _band_of(numbers: pd.Series) -> dict[str, float]:
-    """Percentiles and ends of the numbers of a result (`Spread.bands`)."""
+    """Percentiles 5, 50 and 95, smallest and largest of the numbers of a result (`Spread.bands`).
+
+    ``points`` is how many of them are not NaN.
+    """
     ends = numbers.astype(float).quantile([0.05, 0.5, 0.95, 0.0, 1.0])
     names = ("low", "median", "high", "smallest", "largest")
     band = dict(zip(names, ends.tolist(), strict=True))

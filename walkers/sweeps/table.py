@@ -546,14 +546,16 @@ def _column_texts(frame: pd.DataFrame, name: str) -> tuple[list[str], str]:
 
 
 def _cell(value: Any, factor: float, unit: str) -> str:
-    """A value as text: a number in a unit, rounded as usual for it.
+    """A value as text: a word, or a number that is rounded as usual for its unit.
 
-    The factor converts the number to the unit. A missing value, None or NaN, is a dash.
+    The factor converts the number to the unit, which is not written. A missing value, None or NaN,
+    is a dash.
     """
     if isinstance(value, (bool, str)):
         return str(value)
     if value is None:
         return "-"
+    # `rounded` gives the dash of NaN.
     if factor == 1.0:  # whole numbers stay whole
         return rounded(value, unit)
     return rounded(value * factor, unit)

@@ -3,7 +3,9 @@
 Symbols as in Khan et al., *Self-assembled granular walkers*: bead 1 is the large one, sin δ =
 (R1 - R2)/(R1 + R2), between -1 and 1, and μ = (m1 - m2)/M, so that m1/M = (1 + μ)/2. Contacts 1 and
 2 are the beads on the substrate, 3 is bead on bead; x points from bead 2 to bead 1. Forces are in
-units of 4πγR̄, in which the force of the drive, M a0, is Γ0.
+units of 4πγR̄, in which the force of the drive, M a0, is Γ0. F and F∥ are the normal forces and the
+friction forces at the three contacts, v the sliding velocities there, and a is the acceleration of
+the substrate.
 """
 
 from __future__ import annotations
@@ -48,11 +50,12 @@ def normal_force_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
 
 
 def inertia_matrix(sin_delta: npt.ArrayLike) -> FloatArray:
-    """The matrix G of M dv/dt = -M a (1, 1, 0) - G F∥, shape (…, 3, 3).
+    """The matrix G of M dv/dt = -M a (1, 1, 0) - G F∥, dimensionless, shape (…, 3, 3).
 
-    Eq. 3 of the paper, for solid spheres.
+    Eq. 3 of the paper, for solid spheres, in any unit of force. It is infinite at sin δ = ±1.
     """
     mu = mass_asymmetry(sin_delta)
+    # (m R²/I) (M/m) of each bead: m R²/I is 5/2 for a solid sphere, and m1/M = (1 + μ)/2.
     first = 5.0 / (1.0 + mu)
     second = 5.0 / (1.0 - mu)
     ones = np.ones_like(mu)
