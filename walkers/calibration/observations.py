@@ -142,9 +142,9 @@ class Observation(ConfigTable):
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Smallest and largest number that the fact allows, without its deviation.
+        """Smallest and largest number that the fact allows, without its deviation, in its unit.
 
-        Both are the value if the fact gives one.
+        They are infinite where the fact has no limit. Both are the value if the fact gives one.
         """
         if self.value is not None:
             return self.value, self.value
@@ -239,7 +239,10 @@ def quantities_of_run(run: str | Path) -> dict[str, float]:
 
 
 def _slips(results: Results, walker_count: int, rows: IntArray) -> dict[str, float]:
-    """The quantities `SlipQuantity` of a run, for the walkers in some rows of its table."""
+    """The quantities `SlipQuantity` of a run: sliding of a bead over velocity, root mean squares.
+
+    ``rows`` are those of the walkers in the table ``walkers``, of ``walker_count`` rows.
+    """
     trajectory = results.columns("trajectory")
     cycles = round(trajectory["cycle"].max())
     # A run that ended early has fewer cycles than its case.

@@ -192,7 +192,10 @@ def calibration_record(outcome: Outcome) -> dict[str, Any]:
 
 
 def _posterior_samples(outcome: Outcome) -> dict[str, FloatArray]:
-    """Samples of each parameter, and of ratios of parameters that set the same keys."""
+    """Samples of the posterior by the names of parameters, in their units, shape (samples,) each.
+
+    Further entries ``second/first`` have the ratio of two parameters that set the same keys.
+    """
     calibration = outcome.calibration
     parameters = calibration.file.parameters
     values = calibration.values(outcome.posterior.samples)

@@ -213,7 +213,7 @@ def _ends_of_range(
     check_key(CaseFile, name)
     if range_of(name, given).median is not None:
         raise key_error(name, "expected [low, high]: the case's own value is the median")
-    (ends,) = given.values()
+    (ends,) = given.values()  # of the one distribution, which `range_of` has checked
     values = []
     for end in ends:
         file = validated(CaseFile, changed(CaseFile, tables, {name: end}), source)

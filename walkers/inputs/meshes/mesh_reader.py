@@ -202,7 +202,11 @@ def _check_announced_sizes(path: Path) -> None:
 
 
 def _read_by_vtk(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Points and triangles of a file of one of the formats in `_VTK_READERS`."""
+    """Points (P, 3), in the unit of the file, and triangles (T, 3) of a format in `_VTK_READERS`.
+
+    Raises `NothingRead` for a file without points or of volumes, and `ValueError` for one that
+    announces too many points or has lost their digits (`_check_precision`).
+    """
     ending = path.suffix.lower()
     if ending in (".vtp", ".vtu"):
         _check_announced_sizes(path)
@@ -278,7 +282,10 @@ def _check_other_files(path: Path) -> None:
 
 
 def _read_by_meshio(path: Path) -> tuple[FloatArray, npt.NDArray[np.int64]]:
-    """Points and triangles of a file of a format of meshio."""
+    """Points (P, 3), in the unit of the file, and triangles (T, 3) of a format of meshio.
+
+    Raises `ValueError` for a file that needs other files, and for corners that do not exist.
+    """
     import meshio
 
     _check_other_files(path)

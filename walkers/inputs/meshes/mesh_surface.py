@@ -59,6 +59,8 @@ def vessel_of(mesh: Mapping[str, Any], scale: float) -> Vessel:
     ------
     InputError
         If beads would fall out of it, or if the surface is not that of one vessel.
+    ValueError
+        If a point is not finite, or a triangle has a point that does not exist.
     """
     points = np.array(mesh["points"], dtype=float)
     triangles = np.array(mesh["triangles"], dtype=np.int64)

@@ -420,9 +420,9 @@ class Record(ConfigTable):
             names = ", ".join(f'"{name}"' for name in self.ignored_columns)
             notes.append(f"drive.record: {columns} are left out: {names}")
         # Each gap is of a single row: `_check_times` has refused longer ones.
-        lost = int(np.sum(_are_gaps(np.array(self.rows)[:, 0])))
-        if lost:
-            rows = counted(lost, "row")
+        lost_rows = int(np.sum(_are_gaps(np.array(self.rows)[:, 0])))
+        if lost_rows:
+            rows = counted(lost_rows, "row")
             notes.append(f"drive.record lacks {rows}: the spline goes over the gaps")
         amplitude = self.largest(order=0)
         if not _SMALLEST_DISPLACEMENT < amplitude < _LARGEST_DISPLACEMENT:
@@ -614,13 +614,13 @@ def _check_times(time: FloatArray) -> None:
         problem = f"times repeat: rows {row} and {row + 1} are both at {same_time}"
         raise ValueError(f"{problem}; expected times with more digits, such as whole microseconds")
     usual_step = np.median(steps)
-    too_long = steps > _UNEVEN_STEP * usual_step
-    lost = too_long & (steps <= _LOST_STEP * usual_step)
-    uneven = (steps <= 0.0) | too_long
-    if lost.sum() <= _LARGEST_LOST_SHARE * len(time):
-        uneven &= ~lost
-    if uneven.any():
-        first = np.argmax(uneven)  # a step; it ends at the row first + 1 from 0
+    is_too_long = steps > _UNEVEN_STEP * usual_step
+    lacks_one_row = is_too_long & (steps <= _LOST_STEP * usual_step)
+    is_uneven = (steps <= 0.0) | is_too_long
+    if lacks_one_row.sum() <= _LARGEST_LOST_SHARE * len(time):
+        is_uneven &= ~lacks_one_row
+    if is_uneven.any():
+        first = np.argmax(is_uneven)  # a step; it ends at the row first + 1 from 0
         problem = f"row {first + 2} is {1e3 * steps[first]:.6g} ms after the one before"
         expected = "expected times that increase without gaps"
         raise ValueError(f"{problem}; {expected}, about {1e3 * usual_step:.6g} ms apart")

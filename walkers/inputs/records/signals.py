@@ -76,7 +76,10 @@ def slow_part(samples: FloatArray, width: int) -> FloatArray:
 
 
 def _smoothed(samples: FloatArray, width: int) -> FloatArray:
-    """Hann-weighted means around each sample, and straight lines near both ends."""
+    """Hann-weighted means around each sample, and straight lines near both ends, shape (N, K).
+
+    ``samples`` (N, K) are evenly spaced; ``width`` is the number of samples in a window.
+    """
     weights = _centred_window(samples, width)
     points = len(weights)
     middle = _convolved(samples, weights)

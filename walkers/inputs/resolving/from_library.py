@@ -178,6 +178,7 @@ def _composition(document: Mapping[str, Any], liquid: str | None) -> Composition
 
 def _check_no_composition(values: Mapping[str, Any]) -> None:
     """Refuse values, by their keys, that a liquid which is no mixture must not have."""
+    # There is one mixture.
     message = f'expected none: it is for name = "{next(iter(MIXTURES))}"'
     superfluous = [key for key, value in values.items() if value is not MISSING]
     if superfluous:

@@ -518,7 +518,11 @@ class Excitation:
     def _ramped(
         self, time: FloatArray, x: FloatArray, v: FloatArray, a: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Displacement x, velocity v and acceleration a with the ramp, by the product rule."""
+        """Displacement x (m), velocity v (m/s) and acceleration a (m/s²), multiplied by the ramp.
+
+        The ramp is a factor of the displacement; the others follow by the product rule. Without a
+        ramp all of them are returned unchanged.
+        """
         if not self.ramp:
             return x, v, a
         factor = self.factor(time)

@@ -348,6 +348,8 @@ def climbs_of(tracks: Sequence[Track], beads: PileBeads) -> Columns:
     Returns
     -------
     dict of str to ndarray, shape (tracks,)
+        The columns of `_CLUSTERS_COLUMNS`, in SI units. Their meanings are those of the table
+        ``clusters`` in ``quantities.toml``; ``onset`` and ``qualified`` are NaN without a climb.
 
     Notes
     -----
@@ -543,7 +545,9 @@ def members_of(tracks: Sequence[Track], beads: PileBeads) -> Columns:
     Returns
     -------
     dict of str to ndarray
-        Sorted by frame; in a frame, clusters are in the order of `held_clusters`.
+        A row for each bead of a cluster and frame: ``track`` and ``bead`` are indices, ``time`` is
+        in s, ``large`` tells whether the bead is of the large class, and ``height`` is in m. Sorted
+        by frame; in a frame, clusters are in the order of `held_clusters`.
     """
     clusters = []
     for number, track in enumerate(tracks):
@@ -611,11 +615,23 @@ def assembly_of(
     Returns
     -------
     dict of str to ndarray
-        State of the beads of each climb in each frame, from rest until the climb qualifies.
+        A row for each bead of each climb in each frame, from the last frame before the drive until
+        the climb qualifies; climb by climb, and frame by frame within each. The beads of a climb
+        are those that its cluster has when it qualifies. Without climbs the columns are empty:
+
+        - ``track``: index of the climb's track in ``tracks``
+        - ``bead``: index of the bead in the pile
+        - ``in_bulk``: whether the bead belongs to the bulk
+        - ``at_wall``: whether it has a bridge to a side wall
+        - ``neighbours``: number of its bridges to other beads of the climb
+        - ``joined``: whether such bridges connect it to the largest connected part of the climb
+        - ``time``: time of the frame, s
+        - ``large``: whether the bead is of the large class
+        - ``height``: its height, m
     """
     climbers = _climbers(tracks, climbs, beads)
     parts_of_climbers: list[list[Columns]] = [[] for _ in climbers]
-    at_rest = max(beads.first - 1, 0)
+    last_frame_at_rest = max(beads.first - 1, 0)
     last_frame = max((climber.until for climber in climbers), default=-1)
     if climbers:
         for bridges_now in bridges:
@@ -623,7 +639,7 @@ def assembly_of(
                 break
             at_wall = at_sides(bridges_now, len(beads.large), floor_of(beads.wall_names))
             for climber, parts in zip(climbers, parts_of_climbers, strict=True):
-                if at_rest <= bridges_now.frame <= climber.until:
+                if last_frame_at_rest <= bridges_now.frame <= climber.until:
                     parts.append(_assembly_in_frame(climber, bridges_now, at_wall, beads))
     columns: Columns = {}
     for name, column_type in _ASSEMBLY_COLUMNS.items():
@@ -694,7 +710,9 @@ def events_of(tracks: Sequence[Track], climbs: Columns, beads: PileBeads) -> Col
         A cluster is ``freed`` (it leaves the pile or reaches a wall), ``split`` from another
         cluster, ``merged`` into another cluster, ``rejoined`` (it returns to the pile) or
         ``detached`` (it loses the walls, or its beads separate). Clusters at the start of the drive
-        and clusters that may still go on at the end have no such event.
+        and clusters that may still go on at the end have no such event. Besides ``event``, the
+        columns are ``track``, ``other`` (the track of the other cluster, −1 for none), ``time`` in
+        s, and ``height`` in m: that of the leader, as the table ``clusters`` has it.
     """
     events = []
     for number, track in enumerate(tracks):

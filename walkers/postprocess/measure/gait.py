@@ -416,7 +416,8 @@ def postures(group: Group) -> list[str]:
     """Tell the posture of each walker on a slope or a wall.
 
     A walker with its large bead uphill can tip over like an inverted pendulum; then its velocity
-    has no meaning. The angle is evaluated once per cycle.
+    has no meaning. The angle is evaluated once per cycle, or once in several cycles if frames are
+    that rare.
 
     Parameters
     ----------
@@ -426,10 +427,13 @@ def postures(group: Group) -> list[str]:
     Returns
     -------
     list of str
-        For each walker ``turned_over`` if it turned by more than 90° from its start; ``upright`` if
-        it ends less than 15° from the direction of facing and its angle increased by less than half
-        a degree in the second half of the run; otherwise ``leaning``.
+        For each walker ``turned_over`` if it turned by more than 90° from its start, which may be
+        at an angle; ``upright`` if it ends at most 15° from the direction that it faces and its
+        angle increased by at most half a degree in the second half of the run; otherwise
+        ``leaning``.
     """
+    # Orientations are angles from the direction that walkers face, rad, shape (F, W). The times
+    # `turned_at` are those of turning by 90° from the start, and NaN for walkers that never do.
     angle = np.abs(group.orientation[:: group.case.run.samples_per_cycle])
     end = angle[-1]
     middle = angle[len(angle) // 2]

@@ -181,7 +181,8 @@ class Motion:
 
         Positions are those in the middle of an interval, velocities the displacement over its
         duration. Spins are the averages of the engine over all steps, if it made them; otherwise
-        they are the mean of both ends. Times are those of the ends of the intervals.
+        they are the mean of both ends. Times and displacements of the substrate are those of the
+        later frame. The motion is empty if there is one frame.
         """
         if self.mean_spin is None:
             spin = (self.spin[1:] + self.spin[:-1]) / 2.0
@@ -549,6 +550,9 @@ def _read_segments(case: Case, paths: Sequence[Path]) -> list[_Segment]:
 
 def _read_vectors(segments: Sequence[_Segment]) -> dict[str, FloatArray]:
     """Vectors of the beads in all frames, by the names of their first columns; shape (F, N, 3).
+
+    They are positions ``x`` (m), velocities ``vx`` (m/s), spins ``omegax`` (rad/s), and mean spins
+    (rad/s) if the dumps have them.
 
     Each array is filled once: a stack of whole frames, and copies of parts of it, would need twice
     the memory.

@@ -143,7 +143,12 @@ def _measure_frames(motion: Motion) -> _Frames:
 
 
 def _of_climbs(clusters: Columns) -> dict[str, Any]:
-    """Numbers of all climbs in the table ``clusters``; NaN without climbs."""
+    """Numbers of all climbs in the table ``clusters``.
+
+    They are the number of ``climbs``, the first ``onset`` (s), the mean ``speed`` (m/s), the height
+    of the ``highest`` (m), and how many are ``led_by_large`` beads. Without climbs, both counts are
+    0 and the others NaN.
+    """
     climbs = {name: column[clusters["climbed"]] for name, column in clusters.items()}
     speeds = climbs["speed"][np.isfinite(climbs["speed"])].tolist()
     mean_speed = nan
@@ -162,7 +167,8 @@ def _of_bed(motion: Motion, bed: Columns) -> dict[str, Any]:
     """Numbers of the bed at the start and the end of the drive, at rest, and while it is shaken.
 
     ``…_at_rest`` is in the last frame before the drive, ``…_shaken`` the mean over the second half
-    of the drive.
+    of the drive, NaN without a drive. ``driven`` and ``settling`` are durations, s; the surface is
+    in m, the others are without unit.
     """
     time = motion.time
     end = time[-1]
@@ -212,7 +218,8 @@ def _state_of(
 ) -> dict[str, Any]:
     """The row of the table ``bed`` of the frame of the bridges.
 
-    ``held`` are the clusters that are free of the bulk and held by a side wall.
+    ``held`` are the clusters that are free of the bulk and held by a side wall. Values are in SI
+    units; ``contacts`` and ``bridges`` are numbers per bead, without those at walls.
     """
     frame = bridges.frame
     position = motion.position[frame]

@@ -133,9 +133,10 @@ def _means_of_beads(walkers: Columns, case: Case) -> dict[str, float]:
 
 
 def _numbers_of_kind(number: int, walkers: Columns, case: Case) -> dict[str, float]:
-    """Mean velocity (m/s) and counts of one kind of walkers, which has this number, from 1.
+    """Mean velocity (m/s) and counts of one kind of walkers, by names that end in its number.
 
-    The mean is over the walkers that `same_heading` chooses; the counts are of all walkers.
+    Kinds are numbered from 1. The mean is over the walkers that `same_heading` chooses; the counts
+    are of all walkers.
     """
     velocity = walkers["velocity"][same_heading(walkers, uphill=case.goes_uphill)]
     return {
@@ -230,7 +231,8 @@ def tables_of(group: Group) -> dict[str, Columns]:
     -------
     dict of str to columns
         The tables ``trajectory`` (a row per walker and frame), ``walkers`` (a row per walker) and
-        ``cycles`` (a row per walker and cycle), sorted by walker.
+        ``cycles`` (a row per walker and cycle), sorted by walker. Values are in SI units, angles in
+        rad; the columns are described in ``quantities.toml``.
     """
     averages = gait.averages(group)
     return {

@@ -635,15 +635,20 @@ def _draw_beads(axes: Axes, places: FloatArray, radii: Sequence[float], colour: 
 
 
 def _draw_edge(axes: Axes, case: Case) -> None:
-    """Draw the edge of the floor of a container: where the distance to its side walls is zero."""
+    """Draw the outline of a container: where the distance to its side walls is zero.
+
+    The outline is that at half of its height, where neither the floor nor a rim is near. Side walls
+    are upright; where those of a mesh lean, the outline is not that of the floor.
+    """
     boundary = case.boundary
-    # From side to side and a little beyond, in steps of a two-hundredth of the width.
+    # From side to side and a little beyond, in steps of a two-hundredth of the width. The middle of
+    # a container is at the origin; the width of a mesh is twice its largest distance from there.
     edge = np.linspace(-0.55, 0.55, 221) * boundary.inner_width
     grid = np.stack(np.meshgrid(edge, edge, boundary.inner_height / 2.0), axis=-1)
     places = grid[:, :, 0]
     clearance = boundary.geometry.side_clearance(places.reshape(-1, 3))
-    inside = clearance.reshape(places.shape[:2])
-    axes.contour(1e3 * edge, 1e3 * edge, inside, levels=[0.0], colors=[_GREY], linewidths=1.0)
+    clearance = clearance.reshape(places.shape[:2])  # m
+    axes.contour(1e3 * edge, 1e3 * edge, clearance, levels=[0.0], colors=[_GREY], linewidths=1.0)
 
 
 @styled

@@ -80,7 +80,7 @@ def render_film(
     destination
         The file, an MP4 or a GIF; None: ``film.mp4`` in the run directory.
     options
-        What the film shows.
+        What the film shows, from when to when, and of which walker.
     on_progress
         Called after each picture.
 
@@ -92,8 +92,9 @@ def render_film(
     Raises
     ------
     InputError
-        If the format cannot hold the film, the walker does not exist, or no frame is between begin
-        and end.
+        If the format cannot hold the film, if the walker of the options does not exist, if their
+        times are outside of the drive, or if the package that writes an MP4 is not installed
+        (`walkers.extras.ExtraMissing`).
     WalkersError
         If ffmpeg fails.
     """
@@ -104,7 +105,8 @@ def render_film(
         _check_gif(options)
     else:
         _check_mp4(options)
-        require("film")
+        require("film")  # ffmpeg; Pillow, which is always installed, writes a GIF
+    # Whether a walker is alone in view matters only to series of pictures.
     motion, _ = motion_in_view(read_motion(directory).driven, options.walker)
     times = film_times(motion, options)
     scene = _scene_of(motion, times, options)

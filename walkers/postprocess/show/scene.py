@@ -70,8 +70,9 @@ def gathered(motion: Motion, lane: float = 2.0) -> Motion:
     """Move independent walkers onto parallel lanes for pictures.
 
     In a deck, independent walkers start far apart (``walker.origin``). In a picture, the first one
-    starts at the origin, and the others beside it. Between walls the first walker is shown alone. A
-    motion whose walkers may meet is returned unchanged.
+    starts at the origin, and the others beside it, to the right of the drive axis. Between walls
+    the first walker is shown alone. A motion with loose beads, or whose walkers may meet, is
+    returned unchanged (`walkers.inputs.tables.case.Case.apart`).
 
     Parameters
     ----------

@@ -143,14 +143,21 @@ class Window:
         self._necks = self._add_necks()
 
     def picture(self, frame: float, bridges: IntArray = NO_BRIDGES) -> Picture:
-        """Draw the scene at a time.
+        """Draw the scene at a frame or between two frames.
 
         Parameters
         ----------
         frame
-            Number of a frame, or a time between two frames (a fraction) by cubic interpolation.
+            Number of a frame, from 0. With a fraction, positions between two frames are
+            interpolated by a cubic.
         bridges : ndarray of int, shape (K, 3)
-            The contacts of bridges as in `walkers.postprocess.measure.motion.Bridges`.
+            Contacts with a bridge: two beads and −1, or a bead, −1 and a wall, by their indices
+            (`walkers.postprocess.measure.motion.Bridges`).
+
+        Returns
+        -------
+        Picture
+            Colours of the pixels, 0 to 255, shape (height, width, 3).
         """
         from PIL import Image
 
@@ -175,7 +182,10 @@ class Window:
         self._plotter.close()
 
     def _position_at(self, frame: float) -> FloatArray:
-        """Centres of the beads relative to the boundary at a time, m, shape (N, 3)."""
+        """Centres of the beads relative to the boundary, m, shape (N, 3).
+
+        ``frame`` is the number of a frame, with a fraction between two frames.
+        """
         motion = self._scene.motion
         number = int(frame)
         fraction = frame - number
@@ -186,7 +196,7 @@ class Window:
         )
 
     def _shift_at(self, frame: float) -> FloatArray:
-        """Displacement of the boundary in the view at a time, mm, shape (3,)."""
+        """Displacement of the boundary in the view at a frame, mm, shape (3,)."""
         if not self._scene.shaken:
             return np.zeros(3)
         motion = self._scene.motion
@@ -213,9 +223,9 @@ class Window:
         position : ndarray, shape (N, 3)
             Positions of the beads, m.
         bridges : ndarray, shape (K, 3)
-            Contacts with bridges.
+            Contacts with bridges, as in `picture`.
         shift : ndarray, shape (3,)
-            Displacement of the picture, mm.
+            Displacement of the boundary in the view, mm (`_shift_at`).
         """
         import pyvista as pv
 
@@ -230,6 +240,7 @@ class Window:
         visible_ends = Ends(ends.first[is_visible], ends.second[is_visible])
         points, normals = neck_surfaces(motion, contacts, visible_ends, self._neck_grid)
         triangles = neck_triangles(len(contacts), self._neck_grid)
+        # `neck_surfaces` gives mm, as the shift.
         necks = pv.PolyData.from_regular_faces(points.reshape(-1, 3) + shift, triangles)
         necks.point_data["Normals"] = normals.reshape(-1, 3)
         necks.point_data.active_normals_name = "Normals"
