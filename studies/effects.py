@@ -255,7 +255,7 @@ def row(effect: Effect) -> dict[str, str]:
         mean[peak] = (velocity[f"{peak} g, 60 Hz"] + velocity[f"{peak} g, 90 Hz"]) / 2.0
     force = _force_at_large_bead(all_cases[0], effect, terms[0], lost[0])
     numbers = {
-        "size, %": 100.0 * force / walker.at_rest[0, 0],
+        "size, %": 100.0 * force / walker.normal_at_rest[0, 0],
         "2 g": mean[2],
         "3 g": mean[3],
         "5 g": mean[5],
@@ -286,7 +286,7 @@ def _walkers(cases: Sequence[Case], effect: Effect, lost: FloatArray) -> Walker:
     return replace(
         walker,
         friction=walker.friction * factors[:, None],
-        at_rest=walker.at_rest - lost.T,
+        normal_at_rest=walker.normal_at_rest - lost.T,
         resistances=resistances,
     )
 

@@ -442,7 +442,7 @@ def test_contacts_of_beads_that_slide_at_a_small_friction_stay_closed() -> None:
     """Up to the strongest drive that is tried: 16 times the largest load. The text says so."""
     case = load_case("symmetric")
     prediction = predict(case)
-    strongest = 16.0 * float(Walker.of_case(case).at_rest.max())
+    strongest = 16.0 * float(Walker.of_case(case).normal_at_rest.max())
     assert prediction["detachment"] == {"gamma": strongest, "reason": None}
     sentence = f"stay closed up to about Γ0 = {strongest:.2g}, the strongest drive tried"
     assert sentence in prediction_text(prediction, None)

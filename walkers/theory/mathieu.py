@@ -215,7 +215,8 @@ def _axial_motion(case: Case, walker: Walker) -> _AxialMotion | None:
     total = np.linalg.solve(gains, -slope - np.outer([1.0, 1.0, 0.0], inertial))
     parallel = total - rolling_rates.T @ couples  # F∥ + f of each contact, N
     normal = (
-        walker.at_rest * dimer.capillary_scale + normal_force_matrix(dimer.sin_delta) @ parallel
+        walker.normal_at_rest * dimer.capillary_scale
+        + normal_force_matrix(dimer.sin_delta) @ parallel
     )
     radii = np.array(dimer.radii)[:, None]
     masses = np.array(dimer.masses)[:, None]

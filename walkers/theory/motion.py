@@ -62,7 +62,7 @@ class Walker:
     """4πγR̄/M, m/s²: the acceleration that a force of 1 in the theory's unit gives, shape (N,)."""
     force_unit: FloatArray
     """4πγR̄, N, shape (N,)."""
-    at_rest: FloatArray
+    normal_at_rest: FloatArray
     """Normal forces at rest, in that unit, shape (3, N)."""
     friction: FloatArray
     """Coulomb's coefficient μ at the three contacts, shape (3, N)."""
@@ -97,7 +97,7 @@ class Walker:
             radii=np.array(dimer.radii)[:, None],
             scale=np.array([force_unit / dimer.total_mass]),
             force_unit=np.array([force_unit]),
-            at_rest=(normal_forces / force_unit)[:, None],
+            normal_at_rest=(normal_forces / force_unit)[:, None],
             friction=np.array(coefficients)[:, None],
             resistances=resistances[..., None],
         )
@@ -256,9 +256,9 @@ def _tables(walker: Walker, steps_per_second: FloatArray) -> FloatArray:
     gains = coasting @ inertia[:, None]
     lifts = (pressing @ forces)[:, None]
     presses = pressing[:, None] - h * lifts @ gains
-    at_rest = walker.at_rest.T[:, None, None]
+    normal_at_rest = walker.normal_at_rest.T[:, None, None]
     levels = coasting.shape[:2]
     parts = []
-    for part in (coasting, gains, presses, lifts, at_rest):
+    for part in (coasting, gains, presses, lifts, normal_at_rest):
         parts.append(np.broadcast_to(part, (*levels, *part.shape[2:])))
     return np.concatenate(parts, axis=2)

@@ -170,7 +170,7 @@ def _opening(case: Case) -> dict[str, Any]:
     the paper (`detachment`). In the engine, whose contacts are elastic and damped, they opened at
     0.6 to 1.4 times this Γ0 (four dimers: sin δ = 0.2 and 0.33, friction 0.1 to 0.5, 80 Hz).
     """
-    largest_gamma = _STRONGEST * float(Walker.of_case(case).at_rest.max())
+    largest_gamma = _STRONGEST * float(Walker.of_case(case).normal_at_rest.max())
     gamma, reason = _smallest_gamma(case, largest_gamma, _contacts_open)
     if reason is None:
         return {"gamma": largest_gamma, "reason": None}
