@@ -307,6 +307,18 @@ def test_a_recorded_law_has_the_forces_of_each_volume(other_radius: float) -> No
         np.testing.assert_allclose(curve.forces(gap).pull, pull, rtol=1e-3)
 
 
+def test_a_recorded_law_gives_the_tables_that_were_recorded() -> None:
+    """Within the tolerance of tables of conserved liquid, and in the same order."""
+    case = brief_pile().with_value_at("liquid.conserved", True)
+    surfaces = [(case.contact, case.liquid.of_bridges)]
+    sizes = {(1, 3e-4)}
+    recorded_text = bridge_tables(surfaces, sizes)
+    again = bridge_tables(surfaces, sizes, RecordedLaw(recorded_text, None))
+    heads = re.compile("(?m)^(?:bridge|liquid|range) .*")
+    assert heads.findall(again) == heads.findall(recorded_text)
+    assert rows_of_tables(again) == pytest.approx(rows_of_tables(recorded_text), rel=1e-3)
+
+
 def test_a_recorded_law_refuses_a_volume_that_the_run_did_not_have() -> None:
     case = brief_pile().with_value_at("liquid.conserved", True)
     liquid = case.liquid.of_bridges
