@@ -64,7 +64,7 @@ def make_cache_folder(name: str = "") -> Path:
     Raises
     ------
     OSError
-        If the folder cannot be made or secured (`secure_cache`).
+        If the folder cannot be made or secured (`secure_cache`), or is a link to nothing.
     """
     secure_cache()
     folder = cache_folder()

@@ -287,7 +287,10 @@ def _vessel(case: Case) -> dict[str, Any]:
 
 
 def _dimer(case: Case) -> dict[str, Any]:
-    """Masses (kg), mean radius (m) and numbers without a unit of the first dimers of a case."""
+    """Masses (kg), mean radius (m) and numbers without a unit of the first walkers of a case.
+
+    They are dimers, or clusters of two beads.
+    """
     dimer = dimer_of(case)
     return {
         "total_mass": dimer.total_mass,
