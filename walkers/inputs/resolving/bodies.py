@@ -101,7 +101,7 @@ def walker_drafts(file: CaseFile, notes: Notes) -> dict[str, WalkerDraft]:
 def _radii_of_dimers(dimers: DimersTable, notes: Notes) -> tuple[float, ...]:
     """The radii of dimers, m, from their radii, diameters, or mean radius and asymmetry.
 
-    The validation of the table (`alternatives`) has refused a mean radius without asymmetry.
+    The table (`DimersTable.choices`) has refused a mean radius without asymmetry.
     """
     if dimers.mean_radius is None or dimers.sin_delta is None:
         return _radii(dimers.radii, dimers.diameters, "dimers.radii", notes)
