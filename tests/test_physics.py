@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.conftest import call, make_case
+from tests.conftest import call, document, make_case
 from walkers import run as run_case
 from walkers.arrays import FloatArray
 from walkers.inputs.bridge_laws import by_name
+from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case
 from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.loads import bridge_at_rest, delay_of_walkers
@@ -959,6 +960,56 @@ def test_the_viscous_limit_counts_the_walls_that_a_bead_touches_at_once(
     assert further_rate / rate_of_a_wall == pytest.approx(walls - 1.0, abs=1e-9)
     expected_step = 0.4 * viscous_limit_of(between_walls)
     assert between_walls.run.time_step == pytest.approx(expected_step, rel=0.02)
+
+
+@pytest.fixture(scope="module")
+def beads_of_two_sizes() -> Case:
+    """Two beads of 0.1 and 0.3 mm that are placed in a box of glycerol, and belong to no walker."""
+    tables = document(
+        liquid={"name": "glycerol 87 %"},
+        contact={"roughness": {"bead_bead": "0.5 um", "bead_wall": "1 um"}},
+        boundary={"shape": "box", "width": "20 mm", "height": "10 mm"},
+        placed=[
+            {"radius": "0.1 mm", "at": ["0 mm", "0 mm", "1 mm"]},
+            {"radius": "0.3 mm", "at": ["1 mm", "0 mm", "1 mm"]},
+        ],
+    )
+    del tables["dimers"]
+    tables["run"] = {"duration": "0.1 s"}
+    return build_case(tables, name="beads of two sizes")
+
+
+def test_the_viscous_limit_of_placed_beads_is_of_the_smallest_beside_the_largest(
+    beads_of_two_sizes: Case,
+) -> None:
+    """2/rate of the small bead of mass m at a wall, N(R)/m, and at one of 3 R and 27 m.
+
+    The reduced radius of the two is 3/4 R, and 1/m + 1/27m = (28/27)/m. The large bead is slower:
+    its rate at the wall is a third of that of the small one.
+    """
+    case = beads_of_two_sizes
+    mass = 4.0 / 3.0 * pi * 1e-4**3 * case.beads.density
+    cavitation_gap = 2.0 * 0.061 / AIR_PRESSURE  # 61 mN/m
+    factor = 6.0 * pi * case.liquid.of_bridges.viscosity
+    at_wall = factor * 1e-4**2 / (1e-6 + cavitation_gap)
+    between_beads = factor * 0.75e-4**2 / (0.5e-6 + cavitation_gap)
+    rate = (at_wall + between_beads * 28.0 / 27.0) / mass
+    assert limits_of(case).viscous == pytest.approx(2.0 / rate, rel=1e-5)
+
+
+def test_the_hertz_limit_of_placed_beads_is_of_the_smallest_at_a_wall(
+    beads_of_two_sizes: Case,
+) -> None:
+    """2.87 (m²/(R E*² v))^(1/5), E* = E/(2 (1 - ν²)), E = 50 MPa, v = 4 g/(2π 80 Hz).
+
+    An impact on the large bead takes longer: m²/R is (27/28)²/(3/4) = 1.24 times as large.
+    """
+    case = beads_of_two_sizes
+    mass = 4.0 / 3.0 * pi * 1e-4**3 * case.beads.density
+    modulus = 50e6 / (2.0 * (1.0 - 0.3**2))
+    velocity = 39.2 / (2.0 * pi * 80.0)
+    impact_time = 2.87 * (mass**2 / (1e-4 * modulus**2 * velocity)) ** 0.2
+    assert limits_of(case).hertz == pytest.approx(impact_time, rel=1e-6)
 
 
 @pytest.mark.parametrize("law", LAWS)
