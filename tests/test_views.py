@@ -7,7 +7,9 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass, replace
 from importlib.resources import files
+from math import sqrt
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import imageio_ffmpeg
@@ -20,7 +22,7 @@ from PIL import Image
 from scipy.interpolate import Akima1DInterpolator
 
 import walkers
-from tests.conftest import BRIEF, call
+from tests.conftest import BRIEF, call, make_case
 from tests.printed import letters, spoilt
 from walkers.errors import InputError
 from walkers.inputs.resolving.loads import bridge_at_rest
@@ -28,7 +30,7 @@ from walkers.inputs.tables.boundary import Boundary
 from walkers.postprocess.measure.motion import Group, Motion, read_bridges, read_motion
 from walkers.postprocess.measure.results import read_results
 from walkers.postprocess.measure.tables import read_table
-from walkers.postprocess.show.camera import axes_toward, camera_axes
+from walkers.postprocess.show.camera import axes_toward, camera_axes, named_direction
 from walkers.postprocess.show.figures import (
     MOST_NAMED,
     _interpolated,
@@ -570,6 +572,48 @@ def test_the_camera_follows_a_walker_that_walks_far(single: Motion) -> None:
     displacement = np.linalg.norm(scene.camera_displacement(len(single.time) - 1))
     way = 40.0 * 1e3 * single.case.walkers[0].length  # mm
     assert displacement == pytest.approx(way, rel=0.05)
+
+
+BOX = {"shape": "box", "width": "20 mm", "height": "10 mm"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "direction", "name"),
+    [
+        pytest.param(
+            {"drive": {"axis": "x"}}, [1.0, 0.0, 0.0], "along the drive axis", id="driven along x"
+        ),
+        pytest.param(
+            {"drive": {"axis": "y"}}, [0.0, 1.0, 0.0], "along the drive axis", id="driven along y"
+        ),
+        pytest.param(
+            {"drive": {"axis": [3, 4, 0]}},
+            [0.6, 0.8, 0.0],
+            "along the drive axis",
+            id="driven obliquely",
+        ),
+        pytest.param(
+            {"boundary": {"tilt": "5 deg", "uphill": "60 deg"}},
+            [0.5, sqrt(0.75), 0.0],
+            "uphill",
+            id="slope",
+        ),
+        pytest.param({"boundary": BOX}, [0.0, 0.0, 1.0], "up", id="box"),
+        pytest.param(
+            {"boundary": BOX | {"tilt": "30 deg", "uphill": "0 deg"}},
+            [0.5, 0.0, sqrt(0.75)],
+            "up",
+            id="tilted box: against gravity",
+        ),
+    ],
+)
+def test_the_direction_of_a_displacement_that_pictures_name(
+    changes: dict[str, dict[str, Any]], direction: list[float], name: str, single: Motion
+) -> None:
+    """In the frame of the boundary."""
+    vector, words = named_direction(replace(single, case=make_case(**changes)))
+    assert vector == pytest.approx(direction)
+    assert words == name
 
 
 @pytest.mark.parametrize("lengths", [0.5, 40.0])
