@@ -721,16 +721,12 @@ def test_walkers_that_came_apart_have_no_quantities(early_run: Path, tmp_path: P
     assert np.isnan(list(quantities_of_run(directory).values())).all()
 
 
-def test_a_walker_that_still_turns_is_observed_by_its_angle_alone(
-    run_directory: Callable[..., Path],
-) -> None:
-    """One of two walkers starts across the drive, and still turns.
+@pytest.fixture
+def steady_and_turning(run_directory: Callable[..., Path]) -> Callable[[int], Path]:
+    """Run the first one or two of two walkers: the second one starts across the drive."""
 
-    The other numbers are those of the steady walker beside it, which are those it has alone.
-    """
-
-    def quantities(replicates: int) -> dict[str, float]:
-        directory = run_directory(
+    def run_case(replicates: int) -> Path:
+        return run_directory(
             dimers={
                 "facing": "right",
                 "gap_spread": 0.0,
@@ -740,13 +736,37 @@ def test_a_walker_that_still_turns_is_observed_by_its_angle_alone(
             run={"cycles": 12, "settling_cycles": 6, "samples_per_cycle": 20, "seed": 39},
             drive={"peak_acceleration": "3 g"},
         )
-        return quantities_of_run(directory)
 
-    both = quantities(2)
-    alone = quantities(1)
+    return run_case
+
+
+def test_a_walker_that_still_turns_is_observed_by_its_angle_alone(
+    steady_and_turning: Callable[[int], Path],
+) -> None:
+    """The other numbers are those of the steady walker beside it, which are those it has alone."""
+    both = quantities_of_run(steady_and_turning(2))
+    alone = quantities_of_run(steady_and_turning(1))
     assert both.pop("largest_angle") > 30.0  # degrees
     assert alone.pop("largest_angle") < 1.0
     assert both == pytest.approx(alone, rel=1e-6)
+
+
+def test_a_steady_walker_is_observed_wherever_it_is_in_the_tables(
+    steady_and_turning: Callable[[int], Path], tmp_path: Path
+) -> None:
+    """A copy of a run has the steady walker below the one that still turns."""
+    steady_first = steady_and_turning(2)
+    steady_last = tmp_path / steady_first.name
+    shutil.copytree(steady_first, steady_last)
+    with recomputed(steady_last, ["walkers.parquet", "trajectory.parquet"]):
+        for name in ("walkers", "trajectory"):
+            columns = read_columns(steady_first, name)
+            for column, values in columns.items():
+                columns[column] = np.roll(values, len(values) // 2)
+            write_table(steady_last, name, columns)
+    assert read_columns(steady_last, "walkers")["steady"].tolist() == [False, True]
+    expected = quantities_of_run(steady_first)
+    assert quantities_of_run(steady_last) == pytest.approx(expected)
 
 
 # --- what is written --------------------------------------------------------------------------
