@@ -503,6 +503,16 @@ def test_the_engine_counts_the_steps_of_a_rest_too() -> None:
         make_pile(run={**LONG, "longest_settling": "300 s"})
 
 
+def test_the_longest_drive_leaves_a_second_for_the_last_segment_of_a_rest() -> None:
+    """At 80 Hz, 2^31 steps of 2.5 us are 429,496 whole cycles; a rest of 299 + 1 s takes 24,000.
+
+    The 405,496 cycles that are left are 5068.7 s; without the second they would be 5069.7 s.
+    """
+    rested = {"duration": "6000 s", "time_step": "2.5 us", "longest_settling": "299 s"}
+    with pytest.raises(InputError, match=r"run\.duration.*expected at most 5068 s: the engine"):
+        make_pile(run=rested, drive={"frequency": "80 Hz"})
+
+
 CYLINDER = {"shape": "cylinder"}
 
 
