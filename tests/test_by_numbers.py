@@ -854,6 +854,18 @@ def test_a_cluster_is_held_where_one_of_its_beads_has_a_bridge_to_a_side_wall(
     assert meetings.measure(tray).numbers["held_share"] == pytest.approx(share)
 
 
+def test_a_bead_of_no_walker_at_a_side_wall_holds_no_walker() -> None:
+    """Bead 6 is placed beside three dimers, of beads 0 to 5.
+
+    With such a bead, bridges are in every sample: here in one a cycle.
+    """
+    placed = [{"radius": "0.3 mm", "at": ["9.7 mm", "0 mm", "0.3 mm"]}]
+    run = FEW | {"samples_per_cycle": 1}
+    tray = make_tray({6: [(6, -1, SIDE)]}, boundary=BOX, placed=placed, run=run)
+    assert tray.walker_of.tolist() == [0, 0, 1, 1, 2, 2, -1]
+    assert meetings.measure(tray).numbers["held_share"] == 0.0
+
+
 def test_all_walls_of_a_groove_are_its_floor_for_walkers() -> None:
     """A walker in it has bridges to both walls always, and is not held by them."""
     groove = {"shape": "groove", "opening": "100 deg", "material": "glass"}
