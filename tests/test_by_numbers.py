@@ -34,7 +34,7 @@ from walkers.postprocess.measure.walking import _doubts, _posture, _scatter, _ve
 from walkers.postprocess.show.films import speed_text
 from walkers.postprocess.show.report.player import _points
 from walkers.postprocess.show.scene import Scene, orientations_of, rotations_at
-from walkers.runner.cost import predicted_overhead
+from walkers.runner.cost import predicted_overhead, predicted_seconds
 from walkers.runner.manifest import iso_time
 from walkers.runs.making import progress_in
 from walkers.runs.preview import preview_text, summarise
@@ -329,6 +329,20 @@ def test_measuring_takes_as_long_as_a_run_has_places_of_beads_in_its_first_attem
     assert dimers.run.attempts == (12, 24, 60)
     seconds = 2 * 0.037 + 30e-6 * 12 * 20 * 12
     assert predicted_overhead([dimers, pile]) == pytest.approx(seconds)
+
+
+def test_a_pile_is_predicted_to_rest_three_times() -> None:
+    """Each time for 0.05 s, which are 4 cycles of 5000 steps of 2.5 us, in a start of the engine.
+
+    A start takes 0.04 s, and a step of four beads 1.5 µs and 4/10.7 µs.
+    """
+
+    def seconds(longest_settling: str) -> float:
+        run = {"duration": "0.1 s", "time_step": "2.5 us", "longest_settling": longest_settling}
+        return predicted_seconds(make_other_case(**(PILE | {"run": run})))
+
+    seconds_of_rest = 3 * (0.04 + 4 * 5000 * (1.5e-6 + 4 / 10.7e6))
+    assert seconds("0.2 s") - seconds("0 s") == pytest.approx(seconds_of_rest)
 
 
 CONTINUED = Segment(1104, 1200, 0)
