@@ -345,6 +345,18 @@ def test_a_pile_is_predicted_to_rest_three_times() -> None:
     assert seconds("0.2 s") - seconds("0 s") == pytest.approx(seconds_of_rest)
 
 
+def test_a_tenth_of_runs_that_may_end_early_is_predicted_to_need_each_further_attempt() -> None:
+    """Six dimers take 0.9 + 6 * 0.22 µs a step, and a start of the engine 0.04 s.
+
+    Attempts have 12, 24 and 60 cycles of 3200 steps: 12 + 2.4 + 6 cycles.
+    """
+    case = load_case("fig1b")
+    assert case.run.attempts == (12, 24, 60)
+    assert case.run.steps_per_cycle == 3200
+    seconds = 0.04 + 20.4 * 3200 * (0.9e-6 + 6 * 0.22e-6)
+    assert predicted_seconds(case) == pytest.approx(seconds)
+
+
 CONTINUED = Segment(1104, 1200, 0)
 """The last steps of a run of 1200 steps, of which 1104 had been done by an earlier call."""
 
