@@ -179,7 +179,7 @@ def material_parameters(
         The case of the deck, whose contact parameters are also those of the walls; of a shared
         deck, its first case.
     contacts
-        Contact parameters of the different surfaces of the beads.
+        Contact parameters of the different surfaces of the beads; those of ``case`` are among them.
     scalable_liquid
         The liquid, if the resistances of its bridges are proportional to its viscosity; else None.
     with_density
@@ -191,7 +191,7 @@ def material_parameters(
     if with_density:
         density = number_text(case.beads.density)
         parameters.append(DeckParameter("density", density, "kg/m^3", "of the beads"))
-    moduli = {contact.youngs_modulus for contact in (*contacts, case.contact)}
+    moduli = {contact.youngs_modulus for contact in contacts}
     if len(moduli) == 1:
         modulus = number_text(contacts[0].youngs_modulus)
         note = "softer than the material, for a longer time step; "
