@@ -24,16 +24,19 @@
        normal damping      c_n = 2 √(5/6) β √(k_n m*)   with k_n = 2 E* √(R* d)             [2]
        tangential spring   k_t = 8 G* √(R* d) times the elongation ∫ s dt along the surfaces  [3]
        tangential damping  c_t = 2 √(5/6) β √(k_t m*)
-       Coulomb's limit     |T_c| ≤ μ F_el for the sum of spring and damping
+       friction            |T_c| ≤ μ(s) F_el for the sum of spring and damping,
+                           with μ(s) = μ_0 + Δμ s/(s + s_h) at the speed s = |s| of sliding     [5]
        rolling friction    M_r = μ_r F_el R* (ω - (ω · n) n)/|ω|   with ω = ω_i - ω_j         [4]
 
    The damping ratio β follows from the restitution, e = exp(-πβ/√(1 - β²)). A spring that
-   exceeds Coulomb's limit slips: it is shortened to the limit and has no damping.
+   exceeds the limit of friction slips: it is shortened to the limit and has no damping. Without a rise
+   Δμ the limit is Coulomb's.
 
    [1] H. Hertz, J. reine angew. Math. 92 (1882) 156, doi 10.1515/crll.1882.92.156
    [2] Tsuji et al., doi 10.1016/0032-5910(92)88030-L
    [3] R. D. Mindlin, J. Appl. Mech. 16 (1949) 259
-   [4] Ai et al., doi 10.1016/j.powtec.2010.09.030: constant directional torque, "cdt" in LIGGGHTS */
+   [4] Ai et al., doi 10.1016/j.powtec.2010.09.030: constant directional torque, "cdt" in LIGGGHTS
+   [5] velocity-strengthening friction; half of the rise is reached at s_h */
 #ifndef BRIDGE_FORCES_H
 #define BRIDGE_FORCES_H
 
@@ -56,8 +59,10 @@ struct Materials {
   double shear_stiffness;   // 8 G*
   double damping;           // 2 √(5/6) β √(2 E*)
   double shear_damping;     // 2 √(5/6) β √(8 G*)
-  double friction;          // μ
+  double friction;          // μ_0
   double rolling_friction;  // μ_r
+  double friction_rise;     // Δμ
+  double half_rise_speed;   // s_h
 };
 
 /* Indices in the history of a contact: number of its table (law.h) and elongation of its spring. */
@@ -107,7 +112,7 @@ BY_LANES void measure_pairs()
 }
 
 /* Computes the forces and torques of the batch. Springs stretch for time_step, s. */
-template<bool ROLLING_FRICTION>
+template<bool ROLLING_FRICTION, bool STRENGTHENING>
 __attribute__((always_inline)) inline void compute_batch(const double time_step)
 {
   Batch &b = batch;
@@ -129,7 +134,12 @@ __attribute__((always_inline)) inline void compute_batch(const double time_step)
     Vec elongation = b.spring.get(k) + time_step * sliding;
     elongation = elongation - dot(elongation, n) * n;  // the spring turns with the contact
     Vec tangential = materials.shear_stiffness * root * elongation;
-    const double limit = materials.friction * elastic, spring_squared = dot(tangential, tangential);
+    double friction = materials.friction;
+    if (STRENGTHENING) {
+      const double speed = length(sliding);
+      friction += materials.friction_rise * speed / (speed + materials.half_rise_speed);
+    }
+    const double limit = friction * elastic, spring_squared = dot(tangential, tangential);
     const bool slips = spring_squared > limit * limit;
     tangential = tangential + (slips ? 0. : materials.shear_damping * damping) * sliding;
     const double size = std::sqrt(slips ? spring_squared : dot(tangential, tangential));
@@ -159,8 +169,11 @@ __attribute__((always_inline)) inline void compute_batch(const double time_step)
 BY_LANES void compute_batch(const bool rolling_friction, const bool update, const double time_step)
 {
   const double stretched = update ? time_step : 0.;
-  if (rolling_friction) compute_batch<true>(stretched);
-  else compute_batch<false>(stretched);
+  const bool strengthening = batch.materials->friction_rise != 0.;
+  if (rolling_friction && strengthening) compute_batch<true, true>(stretched);
+  else if (rolling_friction) compute_batch<true, false>(stretched);
+  else if (strengthening) compute_batch<false, true>(stretched);
+  else compute_batch<false, false>(stretched);
   if (!update) return;
   for (int k = 0; k < batch.count; k++) vec(batch.history[k] + SPRING) = batch.spring.get(k);
 }

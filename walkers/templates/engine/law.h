@@ -25,6 +25,8 @@ namespace {
 enum { BRIDGE_ID = 21 };  // number of the cohesion model; Debian's engine has none of this number
 enum { WALL = -1 };       // instead of the index of a second bead
 const char *const NAME = "cohesion_model bridge";
+const char *const RISE = "frictionRise";                         // Δμ
+const char *const HALF_RISE_SPEED = "frictionHalfRiseVelocity";  // s_h, m/s
 
 class Law : protected Pointers {
 public:
@@ -78,6 +80,10 @@ public:
       registry.registerProperty("coeffRollFrict", &MODEL_PARAMS::createCoeffRollFrict);
       registry.connect("coeffRollFrict", rolling_friction, NAME);
     }
+    double **const rises = optional_property(RISE, &create_rise);
+    double **const half_rise_speeds = optional_property(HALF_RISE_SPEED, &create_half_rise_speed);
+    if (!rises != !half_rise_speeds)
+      error->all(FLERR, "cohesion bridge: a deck has both frictionRise and frictionHalfRiseVelocity");
     if (force->cg_active()) error->cg(FLERR, NAME);
     if (conserves_liquid())
       film_ = static_cast<FixPropertyAtom *>(
@@ -92,7 +98,9 @@ public:
                                       damping * std::sqrt(2. * modulus[i][j]),
                                       damping * std::sqrt(8. * shear_modulus[i][j]),
                                       friction[i][j],
-                                      rolling_friction_ ? rolling_friction[i][j] : 0.};
+                                      rolling_friction_ ? rolling_friction[i][j] : 0.,
+                                      rises ? rises[i][j] : 0.,
+                                      rises ? half_rise_speeds[i][j] : 1.};
       }
     register_neighbour_distance();
   }
@@ -196,6 +204,28 @@ private:
   std::vector<bridge::Table> tables_;
   FixPropertyAtom *film_;      // filling of the film of each bead; 0 where liquid is not conserved
   std::vector<double> films_;  // the fillings at the start of the step
+
+  static MatrixProperty *create_rise(PropertyRegistry &registry, const char *caller, bool checks)
+  {
+    return MODEL_PARAMS::createPerTypePairProperty(registry, RISE, caller, checks, 0.);
+  }
+
+  static MatrixProperty *create_half_rise_speed(PropertyRegistry &registry, const char *caller,
+                                                bool checks)
+  {
+    return MODEL_PARAMS::createPerTypePairProperty(registry, HALF_RISE_SPEED, caller, checks, 1e-9);
+  }
+
+  /* The values of a property of pairs of types, or 0 if the deck does not define it. */
+  double **optional_property(const char *const name, const MatrixPropertyCreator creator)
+  {
+    if (!modify->find_fix_property(name, "property/global", "peratomtypepair", 0, 0, NAME, false))
+      return 0;
+    double **values;
+    force->registry.registerProperty(name, creator);
+    force->registry.connect(name, values, NAME);
+    return values;
+  }
 
   bool conserves_liquid() const { return tables_[0].volume > 0.; }
 
