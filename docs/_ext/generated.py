@@ -24,7 +24,14 @@ from pydantic.fields import FieldInfo
 from docs.tables import markdown
 from walkers.commands import ALL_COMMANDS
 from walkers.commands.catalogue import COMMANDS, NOT_KNOWN, Entry, catalogue
-from walkers.inputs.config_table import Choice, ConfigTable, example_of, table_in, table_keys
+from walkers.inputs.config_table import (
+    Choice,
+    ConfigTable,
+    example_of,
+    is_table,
+    table_in,
+    table_keys,
+)
 from walkers.inputs.resolving.from_library import SUPPLIED
 from walkers.inputs.resolving.library import LibraryNumber
 from walkers.inputs.tables.case import CaseFile
@@ -208,7 +215,7 @@ def tables_of_keys(
         table = table_in(field.annotation)
         if table:
             tables[name] = table
-        else:
+        if not is_table(field):
             rows.append(_row(name, field, supplied=f"{path}{name}" in SUPPLIED))
     text = markdown(["key", "meaning", "expects", "default"], rows)
     for choice in model.choices:

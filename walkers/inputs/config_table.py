@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from functools import cache, cached_property
 from typing import Annotated, Any, ClassVar, Self, TypeVar, get_args, get_origin
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Discriminator, Field, ValidationInfo
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, PydanticUndefined
@@ -40,6 +40,19 @@ def _only_derived(value: object, validation: ValidationInfo) -> object:
     return value
 
 
+NUMBER_FORM = "<number>"
+"""Tag of a number where a file may have a number or a table."""
+TABLE_FORM = "<table>"
+"""Tag of a table where a file may have a number or a table."""
+
+
+def _form(value: object) -> str:
+    """The tag of a value where a file may have a number or a table."""
+    return TABLE_FORM if isinstance(value, (Mapping, ConfigTable)) else NUMBER_FORM
+
+
+NUMBER_OR_TABLE = Discriminator(_form)
+"""Annotation of a union of a number and a table, which have the tags above."""
 _DERIVED = BeforeValidator(_only_derived)
 Indirect = Annotated[T | None, SAME_RUN]
 """A key that acts through others: None unless it is given, and no determinant of the run."""
@@ -382,6 +395,13 @@ def table_class_of(field: FieldInfo | None) -> type[ConfigTable] | None:
     return table_in(field.annotation) if field else None
 
 
+def is_table(field: FieldInfo | None) -> bool:
+    """Whether the value of a field is a table, or a list of tables, and never a plain value."""
+    if field is None or table_in(field.annotation) is None:
+        return False
+    return not any(isinstance(item, Discriminator) for item in field.metadata)
+
+
 def example_of(field: FieldInfo) -> str:
     """An example of a value, as in ``a value such as "80 Hz"``, or its type if there is none."""
     if field.examples:
@@ -464,7 +484,8 @@ def changed(
     """
     tables = copy.deepcopy(dict(document))
     for name, value in changes.items():
-        _set_value_at(tables, name, value, alternatives(model, name) - changes.keys())
+        excluded = alternatives(model, name) - changes.keys()
+        _set_value_at(tables, name, copy.deepcopy(value), excluded)
     return tables
 
 

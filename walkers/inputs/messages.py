@@ -18,9 +18,12 @@ from pydantic_core import ErrorDetails
 
 from walkers.errors import InputError, Problem, key_error, quoted, suggestion
 from walkers.inputs.config_table import (
+    NUMBER_FORM,
+    TABLE_FORM,
     ConfigTable,
     dotted_keys,
     example_of,
+    is_table,
     table_class_of,
     table_keys,
 )
@@ -30,6 +33,8 @@ from walkers.rounding import counted
 
 FileModel = TypeVar("FileModel", bound=BaseModel)
 
+_NOT_IN_FILES = ("[key]", NUMBER_FORM, TABLE_FORM)
+"""Parts of the locations of pydantic's errors that are no keys of a file."""
 _SENTENCES = {
     "greater_than": "expected more than {gt:g}",
     "greater_than_equal": "expected at least {ge:g}",
@@ -72,9 +77,9 @@ class _Place:
         return joined(self.parts)
 
     @property
-    def table(self) -> type[ConfigTable] | None:
-        """The class of the tables at the place; None if its value is no table."""
-        return table_class_of(self.field)
+    def is_table(self) -> bool:
+        """Whether the value at the place is a table, or a list of tables."""
+        return is_table(self.field)
 
     @property
     def meaning(self) -> str:
@@ -187,8 +192,9 @@ def _problem_of(
 ) -> Problem:
     """One of pydantic's errors as a problem of a file."""
     error_type = details["type"]
-    # Pydantic marks a name that the user gives, and that is wrong itself, by a part "[key]".
-    location = tuple(part for part in details["loc"] if part != "[key]")
+    # Pydantic marks a name that the user gives, and that is wrong itself, by a part "[key]", and
+    # names the form of a value of several forms.
+    location = tuple(part for part in details["loc"] if part not in _NOT_IN_FILES)
     parts = location
     lacks_entry = error_type == "missing" and isinstance(location[-1], int)
     if lacks_entry:
@@ -222,7 +228,7 @@ def _wrong_length(place: _Place, document: Mapping[str, Any], expected: str) -> 
 
 def _missing(place: _Place) -> str:
     """The message about a required key or table that the file leaves out."""
-    expected = f"a table [{place.key}]" if place.table else place.example
+    expected = f"a table [{place.key}]" if place.is_table else place.example
     message = f"missing; expected {expected}"
     entry = _LIBRARY_ENTRIES.get(str(place.parts[0]))
     is_key_of_table = len(place.parts) > 1  # the table itself must be there to name the entry
@@ -236,7 +242,7 @@ def _wrong_value(place: _Place, details: ErrorDetails) -> str:
     error_type = details["type"]
     context = details.get("ctx", {})
     is_sourced = str(context.get("class_name", "")).startswith("Sourced")  # a number of the library
-    if error_type in ("list_type", "tuple_type") and place.table:
+    if error_type in ("list_type", "tuple_type") and place.is_table:
         message = f"expected tables [[{place.key}]]"
     elif error_type in ("list_type", "tuple_type"):
         message = f"expected a list{place.such_as}"
@@ -281,7 +287,7 @@ def check_key(model: type[ConfigTable], key: str) -> None:
     field = dotted_keys(model).get(".".join(parts))
     if field is None:
         raise key_error(key, _unknown_key(parts, model, "a case"))
-    if table_class_of(field):
+    if is_table(field):
         raise key_error(key, "is a table of a case; expected one of its keys")
 
 
@@ -335,7 +341,7 @@ def _fields_by_indexed_key(model: type[BaseModel]) -> dict[str, FieldInfo]:
 def _same_key_elsewhere(name: str, fields: Mapping[str, FieldInfo]) -> str:
     """A suggestion of the first key of this name in another table; empty if there is none."""
     for key, field in fields.items():
-        is_plain = "*" not in key and not table_class_of(field)
+        is_plain = "*" not in key and not is_table(field)
         if is_plain and key.split(".")[-1] == name:
             return f'; did you mean "{key}"?'
     return ""

@@ -9,12 +9,25 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Annotated, ClassVar
 
+from pydantic import AfterValidator, Tag
+
 from walkers.inputs import units
-from walkers.inputs.config_table import Choice, ConfigTable, Indirect, key
+from walkers.inputs.config_table import (
+    NUMBER_FORM,
+    NUMBER_OR_TABLE,
+    TABLE_FORM,
+    Choice,
+    ConfigTable,
+    Indirect,
+    key,
+)
 from walkers.inputs.units import Coefficient, Number
 from walkers.physics.capillary import DEFAULT_LAW, BridgeLiquid
+from walkers.physics.friction import SlidingFriction
 from walkers.rounding import to_fifteen_digits
 
+SLIDING_VELOCITY = replace(units.SPEED, example="80 mm/s", smallest=1e-6, largest=1.0)
+"""Velocities at which half of the rise of a friction may be reached."""
 STIFFEST = 1e11
 """Largest Young's modulus of contacts, Pa: that of glass or steel, with which a run takes a day."""
 _SOFTENED = Annotated[float, replace(units.MODULUS, smallest=5e6, largest=STIFFEST)]
@@ -104,13 +117,61 @@ class Liquid(LiquidTable):
         )
 
 
-class Friction(ConfigTable):
-    """``[contact.friction]``: Coulomb coefficients."""
+def _not_weakening(rise: float) -> float:
+    """The rise of a friction; raises `ValueError` if it is negative."""
+    if rise < 0.0:
+        raise ValueError(
+            "expected at least 0: friction that falls with the velocity makes contacts stick and "
+            "slip from one time step to the next"
+        )
+    return rise
 
-    bead_bead: Coefficient = key("Coulomb coefficient between two beads.", example=0.25)
-    bead_wall: Coefficient = key(
-        "Coulomb coefficient between a bead and the boundary.", example=0.25
+
+class FrictionLaw(ConfigTable):
+    """``[contact.friction.bead_bead]``: a friction that grows with the sliding velocity."""
+
+    at_rest: Coefficient = key("Friction coefficient of a contact at rest.", example=0.03)
+    rise: Annotated[Number, AfterValidator(_not_weakening)] = key(
+        "Rise of the coefficient at high sliding velocities; 0 is Coulomb's law.",
+        example=0.5,
+        le=1e3,
     )
+    half_rise_velocity: Annotated[float, SLIDING_VELOCITY] = key(
+        "Sliding velocity at which half of the rise is reached."
+    )
+
+
+CoefficientOrLaw = Annotated[
+    Annotated[Coefficient, Tag(NUMBER_FORM)] | Annotated[FrictionLaw, Tag(TABLE_FORM)],
+    NUMBER_OR_TABLE,
+]
+"""A number is Coulomb's coefficient; a table is a friction that grows with the velocity."""
+
+
+class Friction(ConfigTable):
+    """``[contact.friction]``: Coulomb's coefficients, or frictions that grow with the velocity."""
+
+    bead_bead: CoefficientOrLaw = key("Friction coefficient between two beads.", example=0.25)
+    bead_wall: CoefficientOrLaw = key(
+        "Friction coefficient between a bead and the boundary.", example=0.25
+    )
+
+    @property
+    def between_beads(self) -> SlidingFriction:
+        """The law of friction between two beads."""
+        return _law_of(self.bead_bead)
+
+    @property
+    def at_walls(self) -> SlidingFriction:
+        """The law of friction between a bead and the boundary."""
+        return _law_of(self.bead_wall)
+
+
+def _law_of(friction: float | FrictionLaw) -> SlidingFriction:
+    """The law of a friction in either form."""
+    if isinstance(friction, FrictionLaw):
+        return SlidingFriction(friction.at_rest, friction.rise, friction.half_rise_velocity)
+    return SlidingFriction(friction)
 
 
 class Roughness(ConfigTable):
