@@ -170,6 +170,10 @@ LIQUID = {
     "kinematic_viscosity": "5 mm^2/s",
     "viscosity_ratio": 2.0,
 }
+GROWING = {
+    "bead_bead": {"at_rest": 0.05, "rise": 0.4, "half_rise_velocity": "80 mm/s"},
+    "bead_wall": 0.25,
+}
 EDITS: dict[str, Edit] = {
     # A ω² with A = 0.116 mm and ω = 2π · 80 Hz.
     "amplitude": Edit(
@@ -179,6 +183,21 @@ EDITS: dict[str, Edit] = {
     "frictions": Edit(
         parameters={"friction_bead_wall": "0.2", "restitution": "0.5"},
         changes={"contact.friction.bead_wall": 0.2, "contact.restitution": 0.5},
+    ),
+    "a friction that grows with the velocity": Edit(
+        tables={"contact": {**REFERENCE["contact"], "friction": GROWING}},
+        parameters={
+            "friction_bead_bead": "0.04",
+            "friction_rise_bead_bead": "0.3",
+            "friction_velocity_bead_bead": "0.05",
+        },
+        changes={
+            "contact.friction.bead_bead": {
+                "at_rest": 0.04,
+                "rise": 0.3,
+                "half_rise_velocity": "50 mm/s",
+            },
+        },
     ),
     # A third of the cycles settles, as before.
     "length": Edit(
@@ -235,8 +254,8 @@ def _physical_numbers(case: Case) -> list[float]:
         liquid.surface_tension,
         liquid.viscosity,
         case.run.period,
-        case.contact.friction.bead_bead,
-        case.contact.friction.bead_wall,
+        *case.contact.friction.between_beads,
+        *case.contact.friction.at_walls,
         case.contact.restitution,
         case.contact.youngs_modulus,
     ]

@@ -22,6 +22,7 @@ from walkers.inputs.bridge_laws import source_of
 from walkers.inputs.case_building import build_case, stored_case
 from walkers.inputs.config_table import changed
 from walkers.inputs.tables.case import Case, CaseFile
+from walkers.inputs.tables.materials import FrictionLaw
 from walkers.inputs.tables.run import CONSTANT, settling_of
 from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.results import measure
@@ -421,6 +422,12 @@ def _changes(
 def _keys_of_parameters(case: Case) -> dict[str, str]:
     """For each parameter of the deck of a case, the key of the case."""
     keys = dict(_KEYS)
+    for pair in ("bead_bead", "bead_wall"):
+        key = f"contact.friction.{pair}"
+        if isinstance(case.contact.value_of(f"friction.{pair}"), FrictionLaw):
+            keys[f"friction_{pair}"] = f"{key}.at_rest"
+            keys[f"friction_rise_{pair}"] = f"{key}.rise"
+            keys[f"friction_velocity_{pair}"] = f"{key}.half_rise_velocity"
     count = len(case.excitation.harmonics)
     for index, suffix in enumerate(suffixes(count)):
         table = "drive" if count == 1 else f"drive.harmonics[{index}]"

@@ -206,15 +206,42 @@ def material_parameters(
     return parameters
 
 
+def contact_values(contact: Contact) -> dict[str, float]:
+    """Restitution and the coefficients of friction, by the names that they have in a deck.
+
+    Velocities are in m/s. Friction that does not grow with the velocity has a rise of 0.
+    """
+    between_beads = contact.friction.between_beads
+    at_walls = contact.friction.at_walls
+    return {
+        "restitution": contact.restitution,
+        "friction_bead_bead": between_beads.at_rest,
+        "friction_bead_wall": at_walls.at_rest,
+        "friction_rise_bead_bead": between_beads.rise,
+        "friction_rise_bead_wall": at_walls.rise,
+        "friction_velocity_bead_bead": between_beads.half_rise_velocity,
+        "friction_velocity_bead_wall": at_walls.half_rise_velocity,
+        "rolling_friction": contact.rolling_friction,
+    }
+
+
 def _contact_parameters(contact: Contact) -> list[DeckParameter]:
     """Restitution and the coefficients of friction of a deck with one surface of beads."""
-    keys = ["restitution", "friction.bead_bead", "friction.bead_wall"]
-    if contact.rolling_friction > 0:
-        keys.append("rolling_friction")
+    values = contact_values(contact)
     parameters = []
-    for key in keys:
-        value = contact.value_of(key)
-        parameters.append(DeckParameter(key.replace(".", "_"), number_text(value)))
+    for name in ("restitution", "friction_bead_bead", "friction_bead_wall"):
+        parameters.append(DeckParameter(name, number_text(values[name])))
+    for pair in ("bead_bead", "bead_wall"):
+        rise = values[f"friction_rise_{pair}"]
+        if rise:
+            velocity = number_text(values[f"friction_velocity_{pair}"])
+            note = "at high sliding velocities"
+            parameters.append(DeckParameter(f"friction_rise_{pair}", number_text(rise), note=note))
+            note = "at which half of the rise is reached"
+            parameters.append(DeckParameter(f"friction_velocity_{pair}", velocity, "m/s", note))
+    if contact.rolling_friction > 0:
+        rolling_friction = number_text(contact.rolling_friction)
+        parameters.append(DeckParameter("rolling_friction", rolling_friction))
     return parameters
 
 
