@@ -182,7 +182,8 @@ def effect_terms(
     normal
         Normal forces of the contacts, over 4πγR̄, shape (3,).
     friction
-        Coefficients of friction of the contacts, shape (3,).
+        Friction of the contacts, shape (3, 3): for each the coefficient at rest, its rise, and the
+        velocity of half of the rise.
     terms
         Sizes of the effects, shape (9,): lift of the contacts, couples of hysteresis on the beads,
         forces on edges on the substrate, and on beads.
@@ -190,7 +191,7 @@ def effect_terms(
     Returns
     -------
     friction, forces, couples
-        Coefficients of friction, forces and couples for `walkers.theory.motion.predict_motion`.
+        Friction, forces and couples for `walkers.theory.motion.predict_motion`.
     """
     lifts = terms[0:3]
     hysteresis = terms[3:5]
@@ -207,7 +208,7 @@ def effect_terms(
     for contact in range(3):
         if normal[contact] > 0.0:
             lift = lifts[contact] * abs(entraining[contact])
-            friction[contact] *= max(0.0, 1.0 - lift / normal[contact])
+            friction[contact, :2] *= max(0.0, 1.0 - lift / normal[contact])
 
     forces = np.zeros(3)
     couples = np.zeros(3)
@@ -286,6 +287,7 @@ def _walkers(cases: Sequence[Case], effect: Effect, lost: FloatArray) -> Walker:
     return replace(
         walker,
         friction=walker.friction * factors[:, None],
+        friction_rise=walker.friction_rise * factors[:, None],
         normal_at_rest=walker.normal_at_rest - lost.T,
         resistances=resistances,
     )

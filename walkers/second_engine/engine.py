@@ -18,6 +18,7 @@ from walkers.inputs.resolving.loads import surfaces_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import KernelRow, Wall
 from walkers.physics.bridge import BridgeLaw, Surfaces
+from walkers.physics.friction import SlidingFriction
 from walkers.second_engine import kernels
 from walkers.second_engine.kernels import CELLS, BridgeSplines, Constants, State
 
@@ -189,14 +190,19 @@ def _constants(
         shear_modulus=youngs_modulus / (4.0 * (1.0 + poissons_ratio) * (2.0 - poissons_ratio)),
         # β of Tsuji's damping as LIGGGHTS has it, from the coefficient of restitution.
         damping=-log_restitution / sqrt(log_restitution**2 + pi**2) * strengths["damping"],
-        friction_beads=contact.friction.bead_bead * strengths["friction"],
-        friction_walls=contact.friction.bead_wall * strengths["friction"],
+        friction_beads=_scaled_friction(contact.friction.between_beads, strengths["friction"]),
+        friction_walls=_scaled_friction(contact.friction.at_walls, strengths["friction"]),
         rolling=contact.rolling_friction * strengths["rolling-friction"],
         # Beads closer than the sum of both search radii are neighbours.
         search_radius=radius + (longest_bridge + skin) / 2.0,
         skin=skin,
         bridges=bridges,
     )
+
+
+def _scaled_friction(friction: SlidingFriction, factor: float) -> SlidingFriction:
+    """A law of friction whose coefficient is multiplied by a factor at all speeds."""
+    return friction._replace(at_rest=friction.at_rest * factor, rise=friction.rise * factor)
 
 
 def _kernel_rows(case: Case, walls: Sequence[Wall]) -> list[KernelRow]:

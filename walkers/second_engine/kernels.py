@@ -2,9 +2,9 @@
 
 Normals point from the second body (a bead or a wall) to the first; h is the gap, δ = -h the
 overlap. `pair_force` gives the forces of a pair: Hertz's repulsion with Tsuji's damping,
-Mindlin's spring with damping, both together no larger than μ times the elastic repulsion, rolling
-friction, and a bridge between the surfaces, whose capillary force and resistances are splines
-(`BridgeSplines`).
+Mindlin's spring with damping, both together no larger than the friction coefficient at the sliding
+velocity (`walkers.physics.friction`) times the elastic repulsion, rolling friction, and a bridge
+between the surfaces, whose capillary force and resistances are splines (`BridgeSplines`).
 
 The integration is velocity Verlet with the forces evaluated once a step, at the new positions and
 with the velocities half a step before, as granular codes do.
@@ -31,6 +31,7 @@ from typing import NamedTuple
 import numba
 
 from walkers.arrays import BoolArray, FloatArray, IntArray, Vector
+from walkers.physics.friction import SlidingFriction
 
 compiled = numba.njit(cache=True, error_model="numpy")
 """Decorator of kernels."""
@@ -117,8 +118,8 @@ class Constants(NamedTuple):
         Reduced moduli E* and G* of two equal materials, Pa.
     damping : float
         Coefficient β of Tsuji's damping.
-    friction_beads, friction_walls : float
-        Friction coefficient μ between two beads, and between a bead and a wall.
+    friction_beads, friction_walls : SlidingFriction
+        Law of friction between two beads, and between a bead and a wall.
     rolling : float
         Coefficient of rolling friction, the same for beads and walls.
     search_radius : ndarray, shape (N,)
@@ -142,8 +143,8 @@ class Constants(NamedTuple):
     modulus: float
     shear_modulus: float
     damping: float
-    friction_beads: float
-    friction_walls: float
+    friction_beads: SlidingFriction
+    friction_walls: SlidingFriction
     rolling: float
     search_radius: FloatArray
     skin: float
@@ -202,8 +203,8 @@ class Contact(NamedTuple):
         Gap, negative for an overlap, m.
     radius, mass : float
         Reduced radius (m) and mass (kg).
-    friction : float
-        Friction coefficient μ.
+    friction : SlidingFriction
+        Law of friction.
     normal : Vector
         Unit normal from the second body to the first.
     normal_velocity : float
@@ -219,7 +220,7 @@ class Contact(NamedTuple):
     gap: float
     radius: float
     mass: float
-    friction: float
+    friction: SlidingFriction
     normal: Vector
     normal_velocity: float
     sliding_velocity: Vector
@@ -314,7 +315,12 @@ def contact_force(
         normal_part = dot(displacement, contact.normal)
         displacement = add_scaled(displacement, -normal_part, contact.normal)
     stiffness = 8.0 * constants.shear_modulus * root
-    limit = contact.friction * elastic
+    speed = sqrt(dot(contact.sliding_velocity, contact.sliding_velocity))
+    friction = contact.friction
+    coefficient = friction.at_rest
+    if friction.rise:
+        coefficient += friction.rise * speed / (speed + friction.half_rise_velocity)
+    limit = coefficient * elastic
     spring_force = stiffness * sqrt(dot(displacement, displacement))
     scale = 1.0
     tangential_damping = ZERO

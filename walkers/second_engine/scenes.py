@@ -136,6 +136,18 @@ _FULL = {
 """Changes of the bare case: friction, rolling friction, damping and the law of this module."""
 _WEIGHT = {"environment.gravity": "9.81 m/s^2"}
 """Changes of a case whose beads have weight."""
+_GROWING_FRICTION = {
+    "contact.friction.bead_bead": {
+        "at_rest": 0.05,
+        "rise": 0.6,
+        "half_rise_velocity": "30 mm/s",
+    },
+    "contact.friction.bead_wall": {
+        "at_rest": 0.12,
+        "rise": 0.25,
+        "half_rise_velocity": "8 mm/s",
+    },
+}
 _FAST_DRIVE = {
     "drive.frequency": "300 Hz",
     "drive.peak_acceleration": "8 g",
@@ -584,6 +596,9 @@ SCENES: dict[str, Setting] = {
         ]
     ),
     "three beads on the floor": Setting(CLIMBING),
+    "three beads on the floor, friction grows with the velocity": Setting(
+        CLIMBING, changes=_GROWING_FRICTION
+    ),
     "the floor oscillates horizontally": Setting(
         [
             bead_at_plane(BOTTOM, -OVERLAP, LARGE_RADIUS),
@@ -601,6 +616,17 @@ SCENES: dict[str, Setting] = {
     "weight and drive": Setting(
         [bead_at_plane(BOTTOM, -OVERLAP, LARGE_RADIUS), Bead(0, (2e-3, 0.0, 5e-3), SMALL_RADIUS)],
         changes={**_FAST_DRIVE, "drive.frame": "container", "drive.axis": "z", **_WEIGHT},
+    ),
+    "thrown beads, friction grows with the velocity": Setting(
+        [
+            bead_at_plane(
+                BOTTOM, -1e-7, SMALL_RADIUS, velocity=(0.05, 0.0, 0.0), spin=AT_REST, x=-1e-3
+            ),
+            bead_at_plane(BOTTOM, 2e-5, LARGE_RADIUS, velocity=(0.04, -0.03, -0.2), x=1e-3),
+            *pair(1e-5, -0.1, (0.01, -0.02, 0.0)),
+        ],
+        changes={**_WEIGHT, **_GROWING_FRICTION},
+        free_steps=6000,
     ),
     "thrown beads": Setting(
         [

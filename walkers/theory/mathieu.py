@@ -147,7 +147,7 @@ def turning_rate(case: Case) -> float | None:
 
     It is negative for decay, and None if the motion is not periodic.
 
-    Each contact resists sideways sliding by c = μF/|v|, because friction is opposite to the
+    Each contact resists sideways sliding by c = μ(|v|) F/|v|, because friction is opposite to the
     direction of sliding, which is almost along the axis; its bridge resists as along the axis.
     Similarly, rolling friction resists sideways rolling by μ F R/|ω|, with the engine's model of
     constant torque; it is left out of the axial motion.
@@ -158,7 +158,7 @@ def turning_rate(case: Case) -> float | None:
         return None
     frequency = case.excitation.frequency
     speeds = np.maximum(np.abs(axial.sliding), _SLOWEST)
-    sliding_resistance = walker.friction * axial.normal / speeds
+    sliding_resistance = walker.friction_at(speeds) * axial.normal / speeds
     rolling_resistance = _resistance_to_rolling(case, axial)
     slopes = _sideways_slopes(
         dimer_of(case), walker.resistances, axial, sliding_resistance, rolling_resistance

@@ -1,14 +1,15 @@
-"""Equations of motion of a walker that stays in contact, integrated in time with Coulomb friction.
+"""Equations of motion of a walker that stays in contact, integrated in time with sliding friction.
 
-    M dv/dt = -M a(t) (1, 1, 0) - G (F∥ + f + Hᵀm),    F = F0 + D (F∥ + f),    F∥ = μ F sign v
+    M dv/dt = -M a(t) (1, 1, 0) - G (F∥ + f + Hᵀm),    F = F0 + D (F∥ + f),    F∥ = μ(|v|) F sign v
 
 (symbols as in `walkers.theory.quasistatic`). Liquid bridges resist sliding and rolling, q = H v, by
 forces and couples,
 
     f = S v + C q,    m = C v + Q q
 
-(`walkers.physics.bridge`); the couples do not load contacts. Coulomb's law is set-valued: the
-friction of a sticking contact is the force that keeps it at rest. Steps are implicit
+(`walkers.physics.bridge`); the couples do not load contacts. The coefficient μ may grow with the
+sliding velocity (`walkers.physics.friction`). At rest the law is set-valued: the friction of a
+sticking contact is the force that keeps it at rest, up to μ₀ F. Steps are implicit
 (`walkers.theory.stepping`) and find the friction forces by a semi-smooth Newton method. Sticking
 needs no regularisation; steps are short only where a contact begins to stick or to slip. F is the
 normal force of rigid beads; the Coulomb limit of the engine includes contact damping, which
@@ -65,7 +66,11 @@ class Walker:
     normal_at_rest: FloatArray
     """Normal forces at rest, in that unit, shape (3, N)."""
     friction: FloatArray
-    """Coulomb's coefficient μ at the three contacts, shape (3, N)."""
+    """Coefficient μ₀ of friction at rest at the three contacts, shape (3, N)."""
+    friction_rise: FloatArray
+    """Rise Δμ of the coefficient at high sliding velocities, shape (3, N); 0: Coulomb's law."""
+    half_rise_velocity: FloatArray
+    """Sliding velocity of half of the rise, m/s, shape (3, N)."""
     resistances: FloatArray
     """S (N s/m), C (N s) and Q (N m s) of the bridges at the three contacts, shape (3, 3, N).
 
@@ -78,6 +83,14 @@ class Walker:
         first, second = self.radii
         asymmetry: FloatArray = (first - second) / self.radii.sum(axis=0)
         return asymmetry
+
+    def friction_at(self, speeds: FloatArray) -> FloatArray:
+        """Coefficients of friction of the contacts of one walker.
+
+        Sliding speeds are in m/s; these and the coefficients have the shape (3, ...).
+        """
+        growth: FloatArray = self.friction_rise * speeds / (speeds + self.half_rise_velocity)
+        return self.friction + growth
 
     @classmethod
     def of_case(cls, case: Case) -> Walker:
@@ -92,13 +105,16 @@ class Walker:
         if first > second:  # the coupling C is computed with the smaller bead as body 1
             resistances[1, 2] *= -1.0
         friction = case.contact.friction
-        coefficients = (friction.bead_wall, friction.bead_wall, friction.bead_bead)
+        laws = np.array([friction.at_walls, friction.at_walls, friction.between_beads])
+        at_rest, rise, half_rise_velocity = laws.T[..., None]
         return cls(
             radii=np.array(dimer.radii)[:, None],
             scale=np.array([force_unit / dimer.total_mass]),
             force_unit=np.array([force_unit]),
             normal_at_rest=(normal_forces / force_unit)[:, None],
-            friction=np.array(coefficients)[:, None],
+            friction=at_rest,
+            friction_rise=rise,
+            half_rise_velocity=half_rise_velocity,
             resistances=resistances[..., None],
         )
 
@@ -178,9 +194,11 @@ def predict_motion(  # noqa: PLR0913
         shape (N, K). A step consists of two implicit Euler stages
         (`walkers.theory.stepping.STAGE`), and at the start of each the function is called for a
         walker with four arguments: the sliding velocities of its contacts (m/s), their normal
-        forces (in 4πγR̄), their coefficients μ, three numbers each; and its parameters, shape (K,).
-        It returns three arrays of shape (3,): μ, and f and Hᵀm (in 4πγR̄), which add to the forces
-        of the bridges. They are constant through the stage, so that a stiff law needs more steps.
+        forces (in 4πγR̄), three numbers each; their friction, shape (3, 3), with μ₀, Δμ and the
+        velocity of half of the rise (m/s) in the row of each contact; and its parameters, shape
+        (K,). It returns the friction, and two arrays of shape (3,), f and Hᵀm (in 4πγR̄), which
+        add to the forces of the bridges. All are constant through the stage, so that a stiff law
+        needs more steps.
 
     Returns
     -------
@@ -206,7 +224,8 @@ def predict_motion(  # noqa: PLR0913
     )
     drive = np.stack(drive_and_scale[:3], axis=-1).astype(np.float64)
     count = len(drive)
-    friction = np.broadcast_to(walker.friction, (3, count)).T.copy()
+    laws = np.stack([walker.friction, walker.friction_rise, walker.half_rise_velocity])
+    friction = np.broadcast_to(laws, (3, 3, count)).T.copy()
     tables = _tables(walker, drive[:, 0] * steps_per_cycle)
     force_law = None
     parameters = np.zeros((count, 0))

@@ -62,7 +62,7 @@ The cycles of one gait may differ by it; then their mean is used.
 @njit(cache=True)
 def integrate(  # noqa: PLR0913, PLR0917
     tables: FloatArray,
-    mu: FloatArray,
+    friction: FloatArray,
     drive: FloatArray,
     effect: Effect | None,
     parameters: FloatArray,
@@ -77,8 +77,9 @@ def integrate(  # noqa: PLR0913, PLR0917
         Shape (N, 3, 13, 3): for the stages (of h seconds) of a step, of an 8th and of a 64th of it,
         three rows each of P, G (m/s²), D and B (s/m), and a row F0. In a stage, velocities v0
         become P v0 - h G F∥, and normal forces are F0 + B P v0 + D F∥.
-    mu
-        Coulomb's coefficient of each contact, shape (N, 3).
+    friction
+        Friction of each contact, shape (N, 3, 3): the coefficient at rest, its rise, and the
+        sliding velocity of half of the rise (m/s).
     drive
         Frequency (Hz), peak acceleration and steady acceleration (m/s²), shape (N, 3).
     effect
@@ -129,7 +130,7 @@ def integrate(  # noqa: PLR0913, PLR0917
             for step in range(steps):
                 if not _advance(
                     tables[walker],
-                    mu[walker],
+                    friction[walker],
                     drive[walker],
                     effect,
                     parameters[walker],
@@ -167,7 +168,7 @@ def integrate(  # noqa: PLR0913, PLR0917
 @njit(cache=True)
 def _advance(  # noqa: PLR0913, PLR0917
     tables: FloatArray,
-    mu: FloatArray,
+    friction: FloatArray,
     drive: FloatArray,
     effect: Effect | None,
     parameters: FloatArray,
@@ -189,17 +190,21 @@ def _advance(  # noqa: PLR0913, PLR0917
     after = work[:4]
     velocity = (state[0, 0], state[0, 1], state[0, 2])
     after[:] = state
-    solved = _stage(table, mu, drive, effect, parameters, start + stage, stage, velocity, work)
+    solved = _stage(
+        table, friction, drive, effect, parameters, start + stage, stage, velocity, work
+    )
     # The second stage starts from where the slope of the first one leads.
     change = _less((after[0, 0], after[0, 1], after[0, 2]), 1.0, velocity)
     velocity = _less(velocity, 1.0 - 1.0 / STAGE, change)
-    solved &= _stage(table, mu, drive, effect, parameters, start + length, stage, velocity, work)
+    solved &= _stage(
+        table, friction, drive, effect, parameters, start + length, stage, velocity, work
+    )
     if level < LEVELS - 1 and (not solved or (after[_MODE] != state[_MODE]).any()):
         part = length / FINER
         for number in range(FINER):
             if not _advance(
                 tables,
-                mu,
+                friction,
                 drive,
                 effect,
                 parameters,
@@ -224,7 +229,7 @@ def _advance(  # noqa: PLR0913, PLR0917
 @njit(cache=True)
 def _stage(  # noqa: PLR0913, PLR0917
     table: FloatArray,
-    mu: FloatArray,
+    friction: FloatArray,
     drive: FloatArray,
     effect: Effect | None,
     parameters: FloatArray,
@@ -242,14 +247,14 @@ def _stage(  # noqa: PLR0913, PLR0917
     push = seconds * (drive[1] * np.cos(2.0 * np.pi * end) + drive[2])
     free = _times(table, _COAST, (velocity[0] - push, velocity[1] - push, velocity[2]))
     if effect is not None:
-        mu, forces, couples = effect(velocity, state[_NORMAL], mu, parameters)
+        friction, forces, couples = effect(velocity, state[_NORMAL], friction, parameters)
         free = _less(free, seconds, _times(table, _GAIN, couples))
     x, y, z = _times(table, _LIFT, free)
     rest = (table[_REST, 0] + x, table[_REST, 1] + y, table[_REST, 2] + z)
     if effect is not None:
         rest = _less(rest, -1.0, _times(table, _PRESS, forces))
         free = _less(free, seconds, _times(table, _GAIN, forces))
-    solved = _settle(table, mu, seconds, free, rest, work)
+    solved = _settle(table, friction, seconds, free, rest, work)
     for contact in range(3):
         if state[_MODE, contact] == 0.0:
             state[_SLIDING, contact] = 0.0
@@ -263,7 +268,7 @@ def _stage(  # noqa: PLR0913, PLR0917
 @njit(cache=True)
 def _settle(  # noqa: PLR0913, PLR0917
     table: FloatArray,
-    mu: FloatArray,
+    friction: FloatArray,
     seconds: float,
     free: PerContact,
     rest: PerContact,
@@ -287,7 +292,8 @@ def _settle(  # noqa: PLR0913, PLR0917
             speed = free[contact] - seconds * _row(table, _GAIN + contact, parallel)
             scale = seconds * table[_GAIN + contact, contact]
             trial = parallel[contact] + speed / scale
-            if abs(trial) <= normal * mu[contact]:
+            at_rest = friction[contact, 0]
+            if abs(trial) <= normal * at_rest:
                 modes[contact] = 0.0
                 for column in range(3):
                     rows[contact, column] = (
@@ -296,9 +302,19 @@ def _settle(  # noqa: PLR0913, PLR0917
                 right[contact] = speed / scale
                 continue
             modes[contact] = np.sign(trial)
-            slope = modes[contact] * mu[contact]
+            rise = friction[contact, 1]
+            half_rise_velocity = friction[contact, 2]
+            # An iterate may slide the wrong way: it then has the friction at rest.
+            sliding = max(modes[contact] * speed, 0.0)
+            coefficient = at_rest + rise * sliding / (sliding + half_rise_velocity)
+            growth = rise * half_rise_velocity / (sliding + half_rise_velocity) ** 2
+            slope = modes[contact] * coefficient
+            resistance = seconds * growth * normal
             for column in range(3):
-                rows[contact, column] = -slope * table[_PRESS + contact, column]
+                rows[contact, column] = (
+                    resistance * table[_GAIN + contact, column]
+                    - slope * table[_PRESS + contact, column]
+                )
             rows[contact, contact] += 1.0
             right[contact] = slope * normal - parallel[contact]
         change = _solved(rows, right)
