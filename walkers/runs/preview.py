@@ -238,6 +238,8 @@ def _time_step(case: Case) -> dict[str, Any]:
     limits: dict[str, float | None] = {}
     shares = {}
     for name, limit in vars(limits_of(case)).items():
+        if name == "friction" and not isfinite(limit):
+            continue  # friction does not grow with the velocity
         limits[name] = limit if isfinite(limit) else None
         shares[name] = step / limit
     return {

@@ -13,6 +13,7 @@ from math import ceil, floor, inf
 from walkers.errors import key_error
 from walkers.inputs import units
 from walkers.inputs.origins import Source
+from walkers.inputs.resolving.loads import friction_rate
 from walkers.inputs.tables.bodies import Walkers
 from walkers.inputs.tables.case import Setup
 from walkers.inputs.tables.drive import Excitation
@@ -67,6 +68,7 @@ def limits_of(case: Setup) -> TimeStepLimits:
         liquid=case.liquid.of_bridges,
         roughness=case.contact.roughness,
         peak_velocity=case.excitation.peak_velocity,
+        friction_rate=friction_rate(case, bridged),
     )
 
 

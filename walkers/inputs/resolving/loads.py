@@ -9,7 +9,7 @@ damps it (`delay_of_walkers`). It grows with the softness of the beads.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from itertools import combinations_with_replacement
 from math import inf, pi, sqrt
@@ -35,6 +35,8 @@ _MEASURED_ERRORS = (0.0, 0.03, 0.09, 0.15, 1.3)
 """Relative errors of the speed of climbing at these delays: the largest for a diamond, a dimer
 and a cluster in a corner, compared with beads of 12.8 GPa. At the last delay, the dimer goes
 down."""
+_SPHERE = 3.5
+"""Acceleration of the surface of a sphere by a tangential force, over that of its centre."""
 _LARGEST_SPEED = 0.3
 """Speed of walkers for which there is space, over the peak velocity of the substrate.
 
@@ -98,6 +100,41 @@ def _bridge_in_contact(law: BridgeLaw, surfaces: Surfaces) -> Load:
     gap = np.zeros(1)
     pull = curve.pull(gap) if curve.pull else curve.forces(gap).pull
     return Load(surfaces, float(pull[0]), curve.rupture)
+
+
+def friction_rate(case: Setup, bridged: Iterable[tuple[float, Sequence[float]]]) -> float:
+    """The rate of the friction limit of the time step (`walkers.physics.time_step`).
+
+    Parameters
+    ----------
+    case
+        The case.
+    bridged
+        Beads that touch the boundary, with the radius of each and the radii of the beads that it
+        touches, m.
+
+    Returns
+    -------
+    float
+        Σ(7/2 μ'N/m) of the bead for which it is largest, 1/s; 0 if no friction grows with the
+        velocity.
+    """
+    at_walls = case.contact.friction.at_walls.slope
+    between_beads = case.contact.friction.between_beads.slope
+    if not at_walls and not between_beads:
+        return 0.0
+    acceleration = case.environment.gravity + case.excitation.peak_acceleration
+    largest = 0.0
+    for radius, neighbours in bridged:
+        mass = bead_volume(radius) * case.beads.density
+        load = max(bridge_at_rest(case, radius, inf).pull, 0.0) + mass * acceleration
+        rate = at_walls * load / mass
+        for neighbour in neighbours:
+            neighbour_mass = bead_volume(neighbour) * case.beads.density
+            load = max(bridge_at_rest(case, radius, neighbour).pull, 0.0) + mass * acceleration
+            rate += between_beads * load * (1.0 / mass + 1.0 / neighbour_mass)
+        largest = max(largest, rate)
+    return _SPHERE * largest
 
 
 def resistances_at_rest(
