@@ -8,6 +8,7 @@ subject of `walkers.inputs.resolving.steps`.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -33,7 +34,18 @@ OF_LIQUIDS = (
 ROUGHNESS = ("contact.roughness.bead_bead", "contact.roughness.bead_wall")
 """Keys of the roughness of contacts, which follows from the materials of both surfaces."""
 _FRICTION = ("contact.friction.bead_bead", "contact.friction.bead_wall")
-"""Keys of sliding friction, which a surface pair gives."""
+"""Keys of sliding friction, which a surface pair gives: a number, or a table of `_LAW`."""
+_LAW = {"at_rest": "friction", "rise": "friction_rise", "half_rise_velocity": "half_rise_velocity"}
+"""Keys of a friction that grows with the velocity, with the numbers of a surface pair."""
+_KEYS_OF_LAWS = (
+    "contact.friction.bead_bead.at_rest",
+    "contact.friction.bead_bead.rise",
+    "contact.friction.bead_bead.half_rise_velocity",
+    "contact.friction.bead_wall.at_rest",
+    "contact.friction.bead_wall.rise",
+    "contact.friction.bead_wall.half_rise_velocity",
+)
+"""Keys of the tables of both frictions."""
 _OF_SURFACES = (
     "liquid.meniscus_radius",
     "liquid.volume_fraction",
@@ -42,7 +54,14 @@ _OF_SURFACES = (
     "contact.restitution",
 )
 """Other keys that the pair of beads and boundary gives; it names them by their last parts."""
-SUPPLIED = ("beads.density", *OF_LIQUIDS, *_FRICTION, *ROUGHNESS, *_OF_SURFACES)
+SUPPLIED = (
+    "beads.density",
+    *OF_LIQUIDS,
+    *_FRICTION,
+    *_KEYS_OF_LAWS,
+    *ROUGHNESS,
+    *_OF_SURFACES,
+)
 """Keys that a case may leave out because the library has values or defaults."""
 _DESCRIBING_SURFACES = (*_FRICTION, "contact.rolling_friction")
 """Keys that describe surfaces completely."""
@@ -103,7 +122,10 @@ def supplied(
     if composition and value_at(document, parts_of(_TEMPERATURE)) is MISSING:
         sources[_TEMPERATURE] = Source("default", text=_DEFAULT_TEMPERATURE)
     written: dict[str, Any] = {}
+    other_forms = _keys_of_other_forms(document, values)
     for key in SUPPLIED:
+        if key in other_forms:
+            continue
         has_table = isinstance(tables.get(key.split(".")[0]), Mapping)
         equivalent = {key, *alternatives(CaseFile, key)}
         if key not in values or not has_table or equivalent & {*given, *written}:
@@ -111,6 +133,27 @@ def supplied(
         written[key] = values[key].written
         sources[key] = _source_of(key, values[key], calibrated)
     return changed(CaseFile, tables, written), sources, problems
+
+
+def _keys_of_other_forms(
+    document: Mapping[str, Any], values: Mapping[str, LibraryNumber]
+) -> set[str]:
+    """Keys of friction that a case does not take: those of the table, or that of the number.
+
+    A case takes the form in which it gives a friction, and else the one that the library has.
+    ``values`` are as from `_values`.
+    """
+    not_taken: set[str] = set()
+    for key in _FRICTION:
+        written = value_at(document, parts_of(key))
+        grows = isinstance(written, Mapping)
+        if written is MISSING:
+            grows = f"{key}.rise" in values
+        if grows:
+            not_taken.add(key)
+        else:
+            not_taken |= {f"{key}.{part}" for part in _LAW}
+    return not_taken
 
 
 def _name_at(document: Mapping[str, Any], key: str) -> str | None:
@@ -203,6 +246,9 @@ def _values(
         "contact.roughness.bead_bead": library.roughness(bead_material, bead_material),
         "contact.roughness.bead_wall": library.roughness(bead_material, boundary_material),
     }
+    for part, name in _LAW.items():
+        numbers[f"contact.friction.bead_bead.{part}"] = between_beads.get(name)
+        numbers[f"contact.friction.bead_wall.{part}"] = at_boundary.get(name)
     for key in _OF_SURFACES:
         numbers[key] = at_boundary.get(key.split(".")[1])
     for name, number in library.numbers("liquids", liquid or "", composition).items():
@@ -228,6 +274,8 @@ def _source_of(key: str, number: LibraryNumber, liquid: str | None) -> Source:
         law of the case. A number that was calibrated with other liquids is a guess.
     """
     default = unmeasured().get(key)
+    if key in _KEYS_OF_LAWS:  # which have no usual values: a guess keeps the calibrated range
+        default = replace(number, calibrated_with=())
     measured = bool(number.source) and not number.calibrated_with
     ends = number.range
     if default is None or measured:

@@ -180,16 +180,20 @@ class Library:
         -------
         LibraryNumber or None
             In nanometres, to three digits, with the range between the roots for both lower and
-            both upper ends. None if the roughness of a material is unknown.
+            both upper ends, if one of them has a range. None if the roughness of a material is
+            unknown.
         """
         first_number = self.numbers("materials", first or "").get("roughness")
         second_number = self.numbers("materials", second or "").get("roughness")
         if first_number is None or second_number is None:
             return None
-        first_ends = first_number.range or (first_number.written, first_number.written)
-        second_ends = second_number.range or (second_number.written, second_number.written)
-        lowest = _root_of_squares(first_ends[0], second_ends[0])
-        highest = _root_of_squares(first_ends[1], second_ends[1])
+        ends = None
+        if first_number.range or second_number.range:
+            first_low, first_high = first_number.range or [first_number.written] * 2
+            second_low, second_high = second_number.range or [second_number.written] * 2
+            lowest = _root_of_squares(first_low, second_low)
+            highest = _root_of_squares(first_high, second_high)
+            ends = (lowest, highest)
         sources = dict.fromkeys(
             [f"{first}: {first_number.source}", f"{second}: {second_number.source}"]
         )
@@ -200,7 +204,7 @@ class Library:
         return replace(
             template,
             written=_root_of_squares(first_number.written, second_number.written),
-            range=(lowest, highest),
+            range=ends,
             source="; ".join(sources),
         )
 

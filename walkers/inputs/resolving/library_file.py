@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 
 from walkers.inputs import units
 from walkers.inputs.config_table import ConfigTable
+from walkers.inputs.tables.materials import SLIDING_VELOCITY
 from walkers.inputs.units import Coefficient, Number
 
 Q = TypeVar("Q")
@@ -87,11 +88,22 @@ class SurfacePairTable(ConfigTable):
 
     materials: tuple[Text, Text]
     friction: Sourced[Coefficient] | None = None
+    friction_rise: Sourced[Coefficient] | None = None
+    half_rise_velocity: Sourced[Annotated[float, SLIDING_VELOCITY]] | None = None
     rolling_friction: Sourced[Coefficient] | None = None
     restitution: Sourced[Number] | None = None
     volume_fraction: Sourced[Number] | None = None
     meniscus_radius: Sourced[units.Length] | None = None
     contact_angle: Sourced[units.UpToRightAngle] | None = None
+
+    @model_validator(mode="after")
+    def _has_a_whole_law_of_friction(self) -> SurfacePairTable:
+        """The table; raises `ValueError` for a friction that grows without all its numbers."""
+        law = (self.friction, self.friction_rise, self.half_rise_velocity)
+        grows = self.friction_rise is not None or self.half_rise_velocity is not None
+        if grows and None in law:
+            raise ValueError("expected friction, friction_rise and half_rise_velocity together")
+        return self
 
 
 class LibraryFile(ConfigTable):
