@@ -48,6 +48,8 @@ class BridgeLiquid:
         Whether bridges take their liquid from the films of their beads.
     law
         Name of the bridge law (`walkers.physics.laws`).
+    edge_ratio
+        Factor of the resistance of moving edges (`walkers.physics.edges`); 0: edges do not resist.
     """
 
     surface_tension: float
@@ -57,6 +59,7 @@ class BridgeLiquid:
     meniscus_radius: float = 0.0
     conserved: bool = False
     law: str = DEFAULT_LAW
+    edge_ratio: float = 0.0
 
 
 def derjaguin_radius(radius_1: float, radius_2: float) -> float:

@@ -67,6 +67,7 @@ _KEYS: Mapping[str, str] = {
 }
 """For parameters of a deck, the keys of a case; those of the drive depend on its harmonics."""
 _SCALE = """# Writes tables for another viscosity: the deck gives the factor of the resistances.
+/^edge/ { printf "edge %.12g\\n", $2 * resistance ^ (2 / 3); next }
 /^[-+.0-9]/ { printf "%s %s", $1, $2; for (i = 3; i <= NF; i++) printf " %.12g", resistance * $i
               printf "\\n"; next }
 { print }

@@ -17,6 +17,7 @@ import numpy as np
 from walkers.arrays import FloatArray
 from walkers.inputs.bridge_laws import by_name
 from walkers.physics.bridge import BridgeLaw, Curve, Forces, Surfaces, UnusableLawError, columns_at
+from walkers.physics.edges import edge_resistance
 from walkers.templates.placement import Surface
 
 TOLERANCE = 1e-6
@@ -259,6 +260,9 @@ def _tables_of_pair(
         lines.append(f'# law "{liquid.law}"\n{bridge}\n')
         if liquid.conserved:
             lines.append(_liquid_line(with_volume))
+        edge = edge_resistance(with_volume)
+        if edge:
+            lines.append(f"edge {edge!r}\n")
         lines.append(_table_text(law, with_volume, tolerance))
     return lines
 
@@ -323,14 +327,15 @@ class RecordedLaw:
 
 def _is_head_of(head: str, surfaces: Surfaces) -> bool:
     """Whether the head of a table, without the word ``bridge``, is that of two surfaces."""
-    first_line, _, liquid_line = head.partition("\n")
+    first_line, *further_lines = head.splitlines()
     _, _, *radii = first_line.split()  # after two atom types, the smaller radius first
     if [float(radius) for radius in radii] != [surfaces.radius, surfaces.other_radius]:
         return False
-    if not liquid_line:  # without conserved liquid, the radii determine the volume
-        return True
-    _, volume, *_ = liquid_line.split()  # shares and films follow
-    return isclose(float(volume), surfaces.volume, rel_tol=_SAME_VOLUME)
+    for line in further_lines:
+        word, number, *_ = line.split()  # of liquid, shares and films follow
+        if word == "liquid":
+            return isclose(float(number), surfaces.volume, rel_tol=_SAME_VOLUME)
+    return True  # without conserved liquid, the radii determine the volume
 
 
 @lru_cache(maxsize=256)

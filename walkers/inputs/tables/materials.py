@@ -80,6 +80,14 @@ class LiquidTable(ConfigTable):
     viscosity_ratio: Number = key(
         "Factor of the viscosity of the bridges. It scales their viscous forces.", 1.0, ge=0, le=1e4
     )
+    edge_ratio: Number | None = key(
+        "Factor of the viscous forces on the edges of menisci that move over wet surfaces; without "
+        "it, edges do not resist. See [](../../explanation/unexplained.md).",
+        None,
+        1.0,
+        ge=0,
+        le=100,
+    )
     contact_angle: units.UpToRightAngle = key(
         "Contact angle at every bridge. A case whose bridges push the beads of a walker apart "
         "at rest is refused."
@@ -114,6 +122,7 @@ class Liquid(LiquidTable):
             contact_angle=self.contact_angle,
             conserved=self.conserved,
             law=self.law,
+            edge_ratio=self.edge_ratio or 0.0,
         )
 
 

@@ -28,6 +28,18 @@
                            with μ(s) = μ_0 + Δμ s/(s + s_h) at the speed s = |s| of sliding     [5]
        rolling friction    M_r = μ_r F_el R* (ω - (ω · n) n)/|ω|   with ω = ω_i - ω_j         [4]
 
+   The edges of a meniscus resist their motion over both surfaces [6]. The point of contact moves
+   along the surfaces with the velocities
+
+       u_i =  l_i ω_i × n - (l_i/L) t,    u_j = -l_j ω_j × n + (l_j/L) t    with L = l_i + l_j
+
+   where t = v - w n: the line of centres turns with n × t/L. The edges drag surface i along with
+   f_i = E u_i/|u_i|^(1/3), and j with f_j. Their forces and torques add to the above
+
+       (l_j/L) f_j - (l_i/L) f_i    in T,    -(l_i l_j/L) (f_i + f_j)    in C s + Q q
+
+   so that they dissipate f_i · u_i + f_j · u_j. Below U_0 = 10 um/s they are proportional to u.
+
    The damping ratio β follows from the restitution, e = exp(-πβ/√(1 - β²)). A spring that
    exceeds the limit of friction slips: it is shortened to the limit and has no damping. Without a rise
    Δμ the limit is Coulomb's.
@@ -36,7 +48,8 @@
    [2] Tsuji et al., doi 10.1016/0032-5910(92)88030-L
    [3] R. D. Mindlin, J. Appl. Mech. 16 (1949) 259
    [4] Ai et al., doi 10.1016/j.powtec.2010.09.030: constant directional torque, "cdt" in LIGGGHTS
-   [5] velocity-strengthening friction; half of the rise is reached at s_h */
+   [5] velocity-strengthening friction; half of the rise is reached at s_h
+   [6] F. P. Bretherton, J. Fluid Mech. 10 (1961) 166; E is from walkers/physics/edges.py */
 #ifndef BRIDGE_FORCES_H
 #define BRIDGE_FORCES_H
 
@@ -84,6 +97,8 @@ struct Batch {
   Vecs spring;  // its elongation
   Numbers radius_i, radius_j, mass_i, mass_j;
   Numbers bridge[bridge::COLUMNS];  // pull and resistances
+  Numbers edge;                     // E of its bridge
+  Numbers edge_i, edge_j;           // E/|u_i|^(1/3) and E/|u_j|^(1/3)
   Numbers inverse;                  // of the length of d
   Numbers gap, reduced_radius, reduced_mass;
   Vecs force, torque_i, torque_j;  // results; the force is that on i
@@ -111,8 +126,38 @@ BY_LANES void measure_pairs()
   }
 }
 
+/* The velocities u_i and u_j of the edges of a contact along both surfaces, and l_j/L. */
+struct EdgeMotion {
+  Vec i, j;
+  double part_j;
+};
+__attribute__((always_inline)) inline EdgeMotion
+edge_motion(const Batch &b, const int k, const Vec n, const Vec along, const double arm_i,
+            const double arm_j)
+{
+  const double part_j = b.radius_j[k] > 0. ? arm_j / (arm_i + arm_j) : 1.;  // of a wall it is 0
+  return {arm_i * cross(b.omega_i.get(k), n) - (1. - part_j) * along,
+          part_j * along - arm_j * cross(b.omega_j.get(k), n), part_j};
+}
+
+/* Computes the resistances of the edges of the batch. */
+inline void measure_edges()
+{
+  const double slowest = 1e-5;  // U_0, m/s
+  Batch &b = batch;
+  for (int k = 0; k < b.count; k++) {
+    const Vec n = b.inverse[k] * b.d.get(k), v = b.v.get(k), along = v - dot(v, n) * n;
+    const double half = 0.5 * b.gap[k];
+    const EdgeMotion u = edge_motion(b, k, n, along, b.radius_i[k] + half, b.radius_j[k] + half);
+    const double squared_i = dot(u.i, u.i) + slowest * slowest;
+    const double squared_j = dot(u.j, u.j) + slowest * slowest;
+    b.edge_i[k] = b.edge[k] / std::cbrt(std::sqrt(squared_i));
+    b.edge_j[k] = b.edge[k] / std::cbrt(std::sqrt(squared_j));
+  }
+}
+
 /* Computes the forces and torques of the batch. Springs stretch for time_step, s. */
-template<bool ROLLING_FRICTION, bool STRENGTHENING>
+template<bool ROLLING_FRICTION, bool STRENGTHENING, bool EDGES>
 __attribute__((always_inline)) inline void compute_batch(const double time_step)
 {
   Batch &b = batch;
@@ -149,11 +194,19 @@ __attribute__((always_inline)) inline void compute_batch(const double time_step)
     const double coupling = b.bridge[bridge::COUPLING][k];
     tangential = factor * tangential + b.bridge[bridge::SLIDING][k] * sliding + coupling * rolling;
     const double resistance = materials.damping * damping + b.bridge[bridge::NORMAL][k];
+    Vec both_edges = {0., 0., 0.};
+    if (EDGES) {
+      const EdgeMotion u = edge_motion(b, k, n, v - separation * n, arm_i, arm_j);
+      const Vec f_i = b.edge_i[k] * u.i, f_j = b.edge_j[k] * u.j;
+      tangential = tangential + u.part_j * f_j - (1. - u.part_j) * f_i;
+      both_edges = arm_i * u.part_j * (f_i + f_j);
+    }
     const double normal = elastic - b.bridge[bridge::PULL][k] - resistance * separation;
     b.force.put(k, normal * n - tangential);
 
     const Vec turn = cross(n, tangential);
     Vec couple = cross(n, coupling * sliding + b.bridge[bridge::ROLLING][k] * rolling);
+    if (EDGES) couple = couple - cross(n, both_edges);
     if (ROLLING_FRICTION) {
       const double speed = length(spin) + 1e-150;
       const double moment = materials.rolling_friction * elastic * b.reduced_radius[k] / speed;
@@ -164,16 +217,25 @@ __attribute__((always_inline)) inline void compute_batch(const double time_step)
   }
 }
 
+template<bool EDGES>
+__attribute__((always_inline)) inline void compute_batch(const bool rolling_friction,
+                                                         const double time_step)
+{
+  const bool strengthening = batch.materials->friction_rise != 0.;
+  if (rolling_friction && strengthening) compute_batch<true, true, EDGES>(time_step);
+  else if (rolling_friction) compute_batch<true, false, EDGES>(time_step);
+  else if (strengthening) compute_batch<false, true, EDGES>(time_step);
+  else compute_batch<false, false, EDGES>(time_step);
+}
+
 /* Computes the forces and torques of the batch; with update, springs stretch for a step and the
    histories are written. */
-BY_LANES void compute_batch(const bool rolling_friction, const bool update, const double time_step)
+BY_LANES void compute_batch(const bool rolling_friction, const bool edges, const bool update,
+                            const double time_step)
 {
   const double stretched = update ? time_step : 0.;
-  const bool strengthening = batch.materials->friction_rise != 0.;
-  if (rolling_friction && strengthening) compute_batch<true, true>(stretched);
-  else if (rolling_friction) compute_batch<true, false>(stretched);
-  else if (strengthening) compute_batch<false, true>(stretched);
-  else compute_batch<false, false>(stretched);
+  if (edges) compute_batch<true>(rolling_friction, stretched);
+  else compute_batch<false>(rolling_friction, stretched);
   if (!update) return;
   for (int k = 0; k < batch.count; k++) vec(batch.history[k] + SPRING) = batch.spring.get(k);
 }

@@ -31,7 +31,7 @@ const char *const HALF_RISE_SPEED = "frictionHalfRiseVelocity";  // s_h, m/s
 class Law : protected Pointers {
 public:
   Law(LAMMPS *lmp, const bool rolling_friction)
-      : Pointers(lmp), rolling_friction_(rolling_friction), largest_formation_(0.), film_(0)
+      : Pointers(lmp), rolling_friction_(rolling_friction), has_edges_(false), largest_formation_(0.), film_(0)
   {
     of_engines()[lmp] = this;
   }
@@ -58,8 +58,10 @@ public:
     } catch (const std::exception &problem) {
       error->all(FLERR, ("cohesion bridge: " + file_ + ": " + problem.what()).c_str());
     }
-    for (const bridge::Table &table : tables_)
+    for (const bridge::Table &table : tables_) {
       largest_formation_ = std::max(largest_formation_, table.formation);
+      if (table.edge > 0.) has_edges_ = true;
+    }
   }
 
   /* Takes the materials, and the films of the beads, from the properties of the deck. */
@@ -186,17 +188,20 @@ public:
     const double *const row = table ? table->at(gap, interpolated) : interpolated;
     for (int c = 0; c < bridge::COLUMNS; c++) batch.bridge[c][k] = row[c];
     batch.bridge[bridge::COUPLING][k] = std::copysign(1., history[TABLE]) * row[bridge::COUPLING];
+    batch.edge[k] = table ? table->edge : 0.;
     return k;
   }
 
   /* Computes the forces of the batch; with update, springs stretch for a step. */
   void compute(const bool update, const double time_step) const
   {
-    compute_batch(rolling_friction_, update, time_step);
+    if (has_edges_) measure_edges();
+    compute_batch(rolling_friction_, has_edges_, update, time_step);
   }
 
 private:
   const bool rolling_friction_;
+  bool has_edges_;  // of the menisci of any bridge
   double largest_formation_;
   int types_;
   std::vector<Materials> materials_;  // by both types

@@ -6,6 +6,7 @@
 
        bridge TYPE TYPE RADIUS RADIUS           atom types, radii in m; a wall's radius is "inf"
        [liquid VOLUME SHARE SHARE FILM FILM]    of beads whose liquid is conserved (README.md), m3
+       [edge RESISTANCE]                        of the edges of the meniscus (forces.h), N (s/m)^(2/3)
        range FORMATION RUPTURE SCALE OCTAVES CELLS
        GAP PULL NORMAL SLIDING COUPLING ROLLING
 
@@ -89,6 +90,7 @@ public:
   int type[2];
   double radius[2], formation, rupture, contact[COLUMNS];
   double volume, share[2], film[2];  // m3; the volume is 0 where liquid is not conserved
+  double edge;                       // N (s/m)^(2/3); 0 without moving edges
 
   /* The columns at a gap: a pointer to those at contact, or to place, where they are
      interpolated. */
@@ -140,6 +142,13 @@ public:
         *number = words.number();
       if (!(volume > 0. && share[0] > 0. && share[1] >= 0. && film[0] > 0. && film[1] > 0.))
         throw std::runtime_error("the liquid of a table is not usable");
+      word = words.next();
+    }
+    edge = 0.;
+    if (word == "edge") {
+      edge = words.number();
+      if (!(edge >= 0. && std::isfinite(edge)))
+        throw std::runtime_error("the edge of a table is not usable");
       word = words.next();
     }
     if (word != "range") throw std::runtime_error("a table lacks its range");
