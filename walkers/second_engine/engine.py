@@ -18,6 +18,7 @@ from walkers.inputs.resolving.loads import surfaces_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import KernelRow, Wall
 from walkers.physics.bridge import BridgeLaw, Surfaces
+from walkers.physics.edges import edge_resistance
 from walkers.physics.friction import SlidingFriction
 from walkers.second_engine import kernels
 from walkers.second_engine.kernels import CELLS, BridgeSplines, Constants, State
@@ -260,6 +261,7 @@ def _bridges(case: Case, radius: FloatArray, strengths: Mapping[str, float]) -> 
     contribution = np.zeros((count, count + 1, 2))
     spans = []
     splines = []
+    edges: list[float] = []
     volumes: list[float] = []
     for row, small in enumerate(sizes.tolist()):
         first_bridge[row, :row] = first_bridge[:row, row]
@@ -272,6 +274,7 @@ def _bridges(case: Case, radius: FloatArray, strengths: Mapping[str, float]) -> 
                 span, coefficients = _spline(case.law, with_volume)
                 spans.append(span)
                 splines.append(coefficients)
+                edges.append(edge_resistance(with_volume))
                 volumes.append(with_volume.volume)
     lubrication = strengths["lubrication"]
     factors = np.array([strengths["capillary"], lubrication, lubrication, lubrication, lubrication])
@@ -280,6 +283,7 @@ def _bridges(case: Case, radius: FloatArray, strengths: Mapping[str, float]) -> 
         splines=np.stack(splines) * factors,
         size=size_of_bead.astype(np.int64),
         first_bridge=first_bridge,
+        edge=lubrication * np.array(edges),
         volume=np.array(volumes),
         full_step=_VOLUME_STEPS if case.liquid.conserved else 0,
         contribution=contribution,

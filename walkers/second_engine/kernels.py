@@ -31,6 +31,7 @@ from typing import NamedTuple
 import numba
 
 from walkers.arrays import BoolArray, FloatArray, IntArray, Vector
+from walkers.physics.edges import SLOWEST
 from walkers.physics.friction import SlidingFriction
 
 compiled = numba.njit(cache=True, error_model="numpy")
@@ -71,6 +72,8 @@ class BridgeSplines(NamedTuple):
     first_bridge : ndarray of int, shape (K, K + 1)
         Index of the bridge of the smallest volume between beads of two sizes; in the last column,
         between a bead and a wall.
+    edge : ndarray, shape (T,)
+        Resistance of the edges of each bridge, N (s/m)^(2/3).
     volume : ndarray, shape (T,)
         Volume of each bridge, m³.
     full_step : int
@@ -86,6 +89,7 @@ class BridgeSplines(NamedTuple):
     splines: FloatArray
     size: IntArray
     first_bridge: IntArray
+    edge: FloatArray
     volume: FloatArray
     full_step: int
     contribution: FloatArray
@@ -213,6 +217,13 @@ class Contact(NamedTuple):
         Tangential velocity of the first surface relative to the second, m/s.
     relative_spin : Vector
         Difference of the angular velocities, rad/s.
+    first_arm : float
+        Distance of the centre of the first bead from the middle of the contact, m.
+    first_share : float
+        Distance of the contact from the centre of the first bead, over that between the centres; 0
+        at a wall.
+    first_edge_velocity, second_edge_velocity : Vector
+        Velocity at which the point of contact moves along each of the two surfaces, m/s.
     """
 
     bridge: int
@@ -225,6 +236,10 @@ class Contact(NamedTuple):
     normal_velocity: float
     sliding_velocity: Vector
     relative_spin: Vector
+    first_arm: float
+    first_share: float
+    first_edge_velocity: Vector
+    second_edge_velocity: Vector
 
 
 @compiled
@@ -376,7 +391,26 @@ def pair_force(
         turned_sliding = cross(contact.normal, contact.sliding_velocity)
         couple = add_scaled(couple, coupling, turned_sliding)
         couple = add_scaled(couple, rolling, cross(contact.normal, q))
+        resistance = constants.bridges.edge[contact.bridge]
+        if resistance > 0.0:
+            first = edge_drag(resistance, contact.first_edge_velocity)
+            second = edge_drag(resistance, contact.second_edge_velocity)
+            tangential = add_scaled(tangential, contact.first_share, first)
+            tangential = add_scaled(tangential, contact.first_share - 1.0, second)
+            turned_sum = cross(contact.normal, add_scaled(first, 1.0, second))
+            lever = contact.first_arm * (1.0 - contact.first_share)
+            couple = add_scaled(couple, -lever, turned_sum)
     return add_scaled(tangential, normal, contact.normal), couple
+
+
+@compiled
+def edge_drag(resistance: float, velocity: Vector) -> Vector:
+    """Force on a surface along which the edge of a bridge moves with a velocity (m/s), N.
+
+    ``resistance`` is that of the edge, N (s/m)^(2/3) (`walkers.physics.edges`).
+    """
+    squared = dot(velocity, velocity) + SLOWEST**2
+    return add_scaled(ZERO, resistance * squared ** (-1.0 / 6.0), velocity)
 
 
 @compiled
@@ -572,6 +606,8 @@ def contact_of(  # noqa: PLR0913, PLR0917 (a kernel, whose arguments are numbers
     mass = constants.mass[i]
     friction = constants.friction_walls
     coupling_sign = 1.0
+    first_share = 0.0
+    second_turning = ZERO
     if j < constants.radius.shape[0]:
         other_radius = constants.radius[j]
         other_mass = constants.mass[j]
@@ -581,12 +617,21 @@ def contact_of(  # noqa: PLR0913, PLR0917 (a kernel, whose arguments are numbers
         relative_spin = add_scaled(spin, -1.0, other_spin)
         if radius > other_radius:
             coupling_sign = -1.0
+        second_turning = add_scaled(ZERO, other_radius + 0.5 * gap, other_spin)
+        first_share = arm / (arm + other_radius + 0.5 * gap)
         radius = radius * other_radius / (radius + other_radius)
         mass = mass * other_mass / (mass + other_mass)
         friction = constants.friction_beads
     normal_velocity = dot(velocity, normal)
     tangential_velocity = add_scaled(velocity, -normal_velocity, normal)
     sliding_velocity = add_scaled(tangential_velocity, 1.0, cross(normal, turning))
+    first_turning = add_scaled(ZERO, arm, spin)
+    first_edge_velocity = add_scaled(
+        cross(first_turning, normal), -first_share, tangential_velocity
+    )
+    second_edge_velocity = add_scaled(
+        cross(normal, second_turning), 1.0 - first_share, tangential_velocity
+    )
     return Contact(
         bridge,
         coupling_sign,
@@ -598,6 +643,10 @@ def contact_of(  # noqa: PLR0913, PLR0917 (a kernel, whose arguments are numbers
         normal_velocity,
         sliding_velocity,
         relative_spin,
+        arm,
+        first_share,
+        first_edge_velocity,
+        second_edge_velocity,
     )
 
 

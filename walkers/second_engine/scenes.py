@@ -596,6 +596,9 @@ SCENES: dict[str, Setting] = {
         ]
     ),
     "three beads on the floor": Setting(CLIMBING),
+    "three beads on the floor, edges of menisci resist": Setting(
+        CLIMBING, changes={"liquid.edge_ratio": 1.0}
+    ),
     "three beads on the floor, friction grows with the velocity": Setting(
         CLIMBING, changes=_GROWING_FRICTION
     ),

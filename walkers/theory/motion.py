@@ -30,6 +30,7 @@ from walkers.arrays import BoolArray, FloatArray
 from walkers.extras import require
 from walkers.inputs.resolving.loads import contact_loads, dimer_of, resistances_at_rest
 from walkers.inputs.tables.case import Case
+from walkers.physics.edges import edge_resistance
 from walkers.theory.quasistatic import (
     inertia_matrix,
     normal_force_matrix,
@@ -46,6 +47,8 @@ STEPS_PER_CYCLE = 64
 Velocities differ from those with 1024 steps by up to 0.01 mm/s; without viscous bridges by up to
 0.07 mm/s (80 Hz, up to 11 g).
 """
+STEPS_WITH_EDGES = 512
+"""Smallest number of steps per cycle if edges resist, whose forces are constant through a stage."""
 CYCLES = 60
 """Default of the largest number of cycles."""
 
@@ -76,6 +79,9 @@ class Walker:
 
     Body 1 of the last contact is the first bead.
     """
+    edges: FloatArray
+    """Resistance of the edges of each bridge (`walkers.physics.edges`), over 4πγR̄, in (s/m)^(2/3),
+    shape (3, N)."""
 
     @property
     def sin_delta(self) -> FloatArray:
@@ -98,7 +104,9 @@ class Walker:
         dimer = dimer_of(case)
         force_unit = dimer.capillary_scale
         weights = np.array([*dimer.masses, 0.0]) * case.pressing_gravity
-        normal_forces = np.array([load.pull for load in contact_loads(case)]) + weights
+        loads = contact_loads(case)
+        normal_forces = np.array([load.pull for load in loads]) + weights
+        edges = np.array([edge_resistance(load.surfaces) for load in loads])
         first, second = dimer.radii
         surfaces = ((first, inf), (second, inf), (first, second))
         resistances = np.array([resistances_at_rest(case, *pair) for pair in surfaces]).T
@@ -116,6 +124,7 @@ class Walker:
             friction_rise=rise,
             half_rise_velocity=half_rise_velocity,
             resistances=resistances[..., None],
+            edges=edges[:, None] / force_unit,
         )
 
     @classmethod
@@ -214,7 +223,7 @@ def predict_motion(  # noqa: PLR0913
         If the shapes of the arguments do not broadcast.
     """
     require("theory")
-    from walkers.theory.stepping import integrate
+    from walkers.theory.stepping import edge_forces, integrate
 
     drive_and_scale = np.broadcast_arrays(
         np.atleast_1d(frequency),
@@ -224,6 +233,12 @@ def predict_motion(  # noqa: PLR0913
     )
     drive = np.stack(drive_and_scale[:3], axis=-1).astype(np.float64)
     count = len(drive)
+    if walker.edges.any():
+        if effect is not None:
+            raise ValueError("expected no effect beside the edges of the case")
+        edges_and_radii = np.concatenate([walker.edges, walker.radii])
+        effect = (edge_forces, np.broadcast_to(edges_and_radii, (5, count)).T.copy())
+        steps_per_cycle = max(steps_per_cycle, STEPS_WITH_EDGES)
     laws = np.stack([walker.friction, walker.friction_rise, walker.half_rise_velocity])
     friction = np.broadcast_to(laws, (3, 3, count)).T.copy()
     tables = _tables(walker, drive[:, 0] * steps_per_cycle)

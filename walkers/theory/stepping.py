@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from walkers.arrays import BoolArray, FloatArray
+from walkers.physics.edges import SLOWEST
 
 PerContact = tuple[float, float, float]
 """A value for each of the three contacts."""
@@ -163,6 +164,56 @@ def integrate(  # noqa: PLR0913, PLR0917
             repeated[walker] = solved[walker] and scatter < _SCATTER * tolerance
         smallest[:, walker] = totals[1]
     return means, smallest, repeated, solved, series
+
+
+@njit(cache=True)
+def edge_forces(
+    sliding: PerContact, _normal: FloatArray, friction: FloatArray, edges: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The forces of edges of menisci that move, as an `Effect` (`walkers.physics.edges`).
+
+    ``edges`` has the resistances E of the three bridges in 4πγR̄, then R1 and R2 (m).
+
+    The edges of the bridge of a bead to the substrate move with the velocity V of the walker on the
+    substrate, and with the velocity -R dφ/dt of its surface on the bead. Those of the bridge
+    between the beads move with the latter on both beads; their forces f and couples m at that
+    contact conserve the angular momentum of the two.
+    """
+    forces = np.zeros(3)
+    couples = np.zeros(3)
+    velocity = 0.5 * (sliding[0] + sliding[1] - sliding[2])
+    of_walker = _two_thirds(velocity)
+    of_first = _two_thirds(sliding[0] - velocity)  # at R1 dφ1/dt
+    of_second = _two_thirds(sliding[1] - velocity)
+    for bead in range(2):
+        forces[bead] = edges[bead] * of_walker
+        turned = of_first if bead == 0 else of_second
+        # The couple over R, on q = (v - V)/R: its parts act on v and on V = (v1 + v2 - v3)/2.
+        couple = edges[bead] * (turned - of_walker)
+        couples[bead] += couple
+        _add_to_velocity(couples, -couple)
+    first_share = edges[3] / (edges[3] + edges[4])
+    second_share = 1.0 - first_share
+    forces[2] = edges[2] * (first_share * of_first + second_share * of_second)
+    couple = edges[2] * (of_first - of_second)  # over R1 R2/(R1 + R2), on q3 = q1 - q2
+    couples[0] += second_share * couple
+    couples[1] -= first_share * couple
+    _add_to_velocity(couples, (first_share - second_share) * couple)
+    return friction, forces, couples
+
+
+@njit(cache=True)
+def _add_to_velocity(couples: FloatArray, force: float) -> None:
+    """Add a force on the velocity of the walker, (v1 + v2 - v3)/2, to those on v1, v2 and v3."""
+    couples[0] += 0.5 * force
+    couples[1] += 0.5 * force
+    couples[2] -= 0.5 * force
+
+
+@njit(cache=True)
+def _two_thirds(velocity: float) -> float:
+    """The power 2/3 of a velocity (m/s), with its sign; it is linear at the lowest velocities."""
+    return float(velocity * (velocity**2 + SLOWEST**2) ** (-1.0 / 6.0))
 
 
 @njit(cache=True)
