@@ -1,0 +1,198 @@
+"""Edges of menisci that move over wet surfaces: in bridges, both engines and the theory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import walkers
+from studies.literature import experiments
+from walkers.arrays import FloatArray, Vector
+from walkers.inputs.reading import load_case
+from walkers.inputs.resolving.loads import contact_loads, surfaces_of
+from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.shapes.walls import BOTTOM
+from walkers.physics.edges import edge_resistance, wetted_radius
+from walkers.runner.binary import find_engine
+from walkers.second_engine.scenes import (
+    AT_REST,
+    DRY,
+    LARGE_RADIUS,
+    SMALL_RADIUS,
+    Bench,
+    bead_at_plane,
+    bench_case,
+    pair,
+    prescribed,
+    scene_of,
+)
+from walkers.templates.bridge_tables import RecordedLaw
+from walkers.templates.deck import BRIDGES_NAME, render_deck
+from walkers.theory.motion import Walker, predict_motion
+
+MASS = 4000.0 * 4.0 / 3.0 * pi * LARGE_RADIUS**3
+"""Mass of a large bead of 4 g/cm³, kg."""
+
+
+# --- the resistance -------------------------------------------------------------------------------
+
+
+def test_the_resistance_at_a_wall_is_that_of_bretherton() -> None:
+    """7.905 γ r_w (η/γ)^(2/3) of Si AK5: γ = 19.2 mN/m, η = 4.6 mPa s, 5.79 nL under 0.3 mm.
+
+    r_w = (4 · 0.3 mm · 5.79e-12 m³/π)^(1/4) = 0.2168 mm.
+    """
+    case = load_case("fig1b", {"liquid.edge_ratio": 1.0})
+    surfaces = contact_loads(case)[0].surfaces
+    assert wetted_radius(surfaces) == pytest.approx(0.2168e-3, rel=1e-3)
+    expected = 7.905 * 0.0192 * 0.2168e-3 * (0.0046 / 0.0192) ** (2.0 / 3.0)
+    assert edge_resistance(surfaces) == pytest.approx(expected, rel=2e-3)
+
+
+def test_the_resistance_is_proportional_to_the_ratio() -> None:
+    surfaces = [
+        contact_loads(load_case("fig1b", {"liquid.edge_ratio": ratio}))[0].surfaces
+        for ratio in (1.0, 1.5)
+    ]
+    assert edge_resistance(surfaces[1]) == pytest.approx(1.5 * edge_resistance(surfaces[0]))
+
+
+def test_edges_of_much_liquid_are_narrower_than_the_bead() -> None:
+    case = load_case("fig1b", {"liquid.volume_fraction": 0.5, "liquid.edge_ratio": 1.0})
+    assert wetted_radius(contact_loads(case)[0].surfaces) == 0.8 * 0.3e-3
+
+
+def test_without_a_ratio_edges_do_not_resist() -> None:
+    case = load_case("fig1b")
+    assert edge_resistance(contact_loads(case)[0].surfaces) == 0.0
+    assert "edge" not in render_deck(case).files[BRIDGES_NAME]
+
+
+# --- beads with edges alone -----------------------------------------------------------------------
+
+
+@pytest.fixture
+def bench(in_folder: Path) -> Iterator[experiments.Bench]:
+    """A place for decks."""
+    with experiments.workbench() as bench:
+        yield bench
+
+
+def case_of_edges(**changes: object) -> Case:
+    """Beads without friction, damping and other forces of bridges, whose edges resist."""
+    return bench_case(
+        {
+            **DRY,
+            "environment.gravity": "9.81 m/s^2",
+            "liquid.dynamic_viscosity": "4.6 mPa*s",
+            "liquid.edge_ratio": 1.0,
+            **changes,
+        }
+    )
+
+
+def slowed(bench: experiments.Bench, case: Case, *, velocity: Vector, spin: Vector) -> FloatArray:
+    """Frames of a large bead on the floor every 100 steps of 1 µs, shape (frames, 9)."""
+    overlap = contact_loads(case)[0].overlap
+    bead = bead_at_plane(BOTTOM, -overlap, LARGE_RADIUS, velocity=velocity, spin=spin)
+    return experiments.run_beads(bench, [(bead, case)], 20_000, 100)[:, 0]
+
+
+def resistance_at_floor(case: Case) -> float:
+    """Resistance of the edges of a large bead at the floor, N (s/m)^(2/3)."""
+    return edge_resistance(surfaces_of(case, LARGE_RADIUS, np.inf))
+
+
+def test_edges_slow_a_bead_as_the_closed_form_says(bench: experiments.Bench) -> None:
+    """The equation m dv/dt = -E v^(2/3) has the solution v^(1/3) = v₀^(1/3) - E t/(3m)."""
+    case = case_of_edges()
+    frames = slowed(bench, case, velocity=(0.05, 0.0, 0.0), spin=AT_REST)
+    time = 1e-4 * np.arange(len(frames))
+    root = 0.05 ** (1.0 / 3.0) - resistance_at_floor(case) * time / (3.0 * MASS)
+    assert frames[-1, 3] < 0.035
+    assert frames[:, 3] == pytest.approx(root**3, rel=1e-4)
+
+
+def test_edges_slow_the_rotation_of_a_bead_as_the_closed_form_says(
+    bench: experiments.Bench,
+) -> None:
+    """With I = 2/5 mR², u = Rω slows down 5/2 times as fast as the velocity does."""
+    case = case_of_edges()
+    frames = slowed(bench, case, velocity=AT_REST, spin=(0.0, 0.05 / LARGE_RADIUS, 0.0))
+    time = 1e-4 * np.arange(len(frames))
+    root = 0.05 ** (1.0 / 3.0) - 2.5 * resistance_at_floor(case) * time / (3.0 * MASS)
+    assert LARGE_RADIUS * frames[:, 7] == pytest.approx(root**3, rel=5e-4)
+
+
+def test_edges_do_not_turn_a_bead_that_moves_without_rotation(bench: experiments.Bench) -> None:
+    frames = slowed(bench, case_of_edges(), velocity=(0.05, 0.0, 0.0), spin=AT_REST)
+    assert np.abs(LARGE_RADIUS * frames[:, 6:9]).max() < 1e-4 * 0.05
+
+
+def test_a_bead_that_turns_at_a_bead_at_rest_does_not_turn_it(tmp_path: Path) -> None:
+    """Only its own edge moves; its force presses on both beads, toward the one at rest."""
+    case = case_of_edges(**{"environment.gravity": "0 m/s^2"})
+    beads = pair(-1e-6, 0.0, AT_REST, (AT_REST, (50.0, -80.0, 30.0)))
+    output = Bench(find_engine(), tmp_path).run(prescribed(case, scene_of(beads), 10))
+    at_rest, turning = output.forces[1, :, 3:]
+    assert np.abs(at_rest).max() < 1e-9 * np.abs(turning).max()
+    assert np.abs(output.forces[1, :, :3]).max() > 0.0
+
+
+def test_edges_between_beads_conserve_momentum_and_angular_momentum(tmp_path: Path) -> None:
+    """Relative to the largest force and torque on a pair that slides and turns."""
+    case = case_of_edges(**{"environment.gravity": "0 m/s^2"})
+    beads = pair(-1e-6, 0.0, (0.02, -0.03, 0.01))
+    output = Bench(find_engine(), tmp_path).run(prescribed(case, scene_of(beads), 100))
+    places = output.frames[-1, :, :3]
+    forces = output.forces[-1, :, :3]
+    torques = output.forces[-1, :, 3:]
+    total_torque = (torques + np.cross(places, forces)).sum(axis=0)
+    assert np.abs(forces.sum(axis=0)).max() < 1e-12 * np.abs(forces).max()
+    assert np.abs(total_torque).max() < 1e-9 * np.abs(torques).max()
+
+
+# --- walkers --------------------------------------------------------------------------------------
+
+EDGES = {
+    "liquid.edge_ratio": 1.5,
+    "contact.rolling_friction": 0.0,
+    "dimers.replicates": 2,
+}
+
+
+@pytest.mark.parametrize("peak", ["3 g", "10 g"])
+def test_theory_and_engine_agree_on_a_walker_with_edges(peak: str, in_folder: Path) -> None:
+    """Within 3 %, as without edges: the engine has softened beads."""
+    case = load_case("fig1b", {**EDGES, "drive.peak_acceleration": peak})
+    motion = predict_motion(Walker.of_case(case), 80.0, case.excitation.peak_acceleration)
+    velocity = walkers.run(case, Path("runs"), progress=False).result["velocity"]
+    assert velocity == pytest.approx(motion.velocity[0], rel=0.03)
+
+
+def test_edges_slow_a_walker_by_a_third_at_a_weak_drive() -> None:
+    """At 2 g and 60 Hz, where it walks at 1.1 mm/s without them."""
+    drive = {"drive.peak_acceleration": "2 g", "drive.frequency": "60 Hz"}
+    plain, edged = (
+        predict_motion(Walker.of_case(load_case("fig1b", {**drive, **edges})), 60.0, 19.6)
+        for edges in ({}, {"liquid.edge_ratio": 1.0})
+    )
+    assert edged.velocity[0] / plain.velocity[0] == pytest.approx(0.68, abs=0.03)
+
+
+def test_the_theory_takes_no_other_effect_beside_edges() -> None:
+    walker = Walker.of_case(load_case("fig1b", EDGES))
+    with pytest.raises(ValueError, match="no effect beside the edges"):
+        predict_motion(walker, 80.0, 39.2, effect=(lambda: None, np.zeros((1, 0))))  # type: ignore[arg-type, return-value]
+
+
+def test_a_recorded_law_is_found_again_in_tables_with_edges() -> None:
+    case = load_case("fig1b", EDGES)
+    tables = render_deck(case).files[BRIDGES_NAME]
+    surfaces = surfaces_of(case, SMALL_RADIUS, np.inf)
+    curve = RecordedLaw(tables, None)(surfaces)
+    assert curve.rupture == pytest.approx(case.law(surfaces).rupture)
