@@ -16,7 +16,7 @@ the velocity of a bead that rolls on it: the force acts on a bead that moves alo
 torque on a bead that rotates. `walkers/templates/engine/forces.h` has the velocities for two beads.
 
 The term is an estimate: it is derived for Ca → 0, a film ahead of the meniscus, and an edge in
-steady motion. Its factor, ``edge_ratio`` of a `BridgeLiquid`, may lie between 0.5 and 2.
+steady motion. Its factor, the ``edge_ratio`` of a liquid, may lie between 0.5 and 2.
 
 References
 ----------
