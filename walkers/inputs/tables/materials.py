@@ -78,7 +78,11 @@ class LiquidTable(ConfigTable):
         "70 um",
     )
     viscosity_ratio: Number = key(
-        "Factor of the viscosity of the bridges. It scales their viscous forces.", 1.0, ge=0, le=1e4
+        "Factor of the viscosity of the bridges. It scales their viscous forces, those of edges by "
+        "its power 2/3.",
+        1.0,
+        ge=0,
+        le=1e4,
     )
     edge_ratio: Number | None = key(
         "Factor of the viscous forces on the edges of menisci that move over wet surfaces; without "
@@ -86,7 +90,7 @@ class LiquidTable(ConfigTable):
         None,
         1.0,
         ge=0,
-        le=100,
+        le=10,
     )
     contact_angle: units.UpToRightAngle = key(
         "Contact angle at every bridge. A case whose bridges push the beads of a walker apart "
