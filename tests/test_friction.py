@@ -384,6 +384,13 @@ def test_a_sweep_varies_the_rise() -> None:
     assert rises == [0.2, 0.4]
 
 
+def test_a_table_does_not_take_its_friction_at_rest_from_coulombs_law() -> None:
+    """That of ruby was found with Coulomb's law."""
+    growth = {f"{BETWEEN_BEADS}.rise": 0.4, f"{BETWEEN_BEADS}.half_rise_velocity": "80 mm/s"}
+    with pytest.raises(InputError, match=r"bead_bead\.at_rest: missing"):
+        load_case("fig1b", growth)
+
+
 def test_a_table_without_its_velocity_is_refused() -> None:
     with pytest.raises(InputError, match=r"bead_bead\.half_rise_velocity: missing"):
         load_case("fig1b", {BETWEEN_BEADS: {"at_rest": 0.1, "rise": 0.2}})

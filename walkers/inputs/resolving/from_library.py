@@ -246,9 +246,10 @@ def _values(
         "contact.roughness.bead_bead": library.roughness(bead_material, bead_material),
         "contact.roughness.bead_wall": library.roughness(bead_material, boundary_material),
     }
-    for part, name in _LAW.items():
-        numbers[f"contact.friction.bead_bead.{part}"] = between_beads.get(name)
-        numbers[f"contact.friction.bead_wall.{part}"] = at_boundary.get(name)
+    # A coefficient that was found with Coulomb's law is not the friction at rest of a growing one.
+    for key, pair in zip(_FRICTION, (between_beads, at_boundary), strict=True):
+        for part, name in _LAW.items():
+            numbers[f"{key}.{part}"] = pair.get(name) if "friction_rise" in pair else None
     for key in _OF_SURFACES:
         numbers[key] = at_boundary.get(key.split(".")[1])
     for name, number in library.numbers("liquids", liquid or "", composition).items():
