@@ -117,7 +117,7 @@ def friction_rate(case: Setup, bridged: Iterable[tuple[float, Sequence[float]]])
     -------
     float
         Σ(7/2 μ'N/m) of the bead for which it is largest, 1/s; 0 if no friction grows with the
-        velocity.
+        velocity. Loads are those of a bead alone, without beads above it.
     """
     at_walls = case.contact.friction.at_walls.slope
     between_beads = case.contact.friction.between_beads.slope
@@ -125,10 +125,12 @@ def friction_rate(case: Setup, bridged: Iterable[tuple[float, Sequence[float]]])
         return 0.0
     acceleration = case.environment.gravity + case.excitation.peak_acceleration
     largest = 0.0
+    damping = case.boundary.geometry.damping
     for radius, neighbours in bridged:
+        walls = damping(radius)
         mass = bead_volume(radius) * case.beads.density
         load = max(bridge_at_rest(case, radius, inf).pull, 0.0) + mass * acceleration
-        rate = at_walls * load / mass
+        rate = walls * at_walls * load / mass
         for neighbour in neighbours:
             neighbour_mass = bead_volume(neighbour) * case.beads.density
             load = max(bridge_at_rest(case, radius, neighbour).pull, 0.0) + mass * acceleration
