@@ -468,7 +468,7 @@ def test_a_dry_contact_with_a_wall_begins_without_friction(bench: Bench) -> None
     assert np.abs(output.forces[41:, 0, :2]).max() < 1e-9 * abs(shear)
 
 
-FORCES = {8: "44340c4778ae89d6"}
+FORCES = {8: "fbac36197c2faf45"}
 """Digest of the code of the contact model, for the version of its forces."""
 
 

@@ -143,7 +143,7 @@ edge_motion(const Batch &b, const int k, const Vec n, const Vec along, const dou
 /* Computes the resistances of the edges of the batch. */
 inline void measure_edges()
 {
-  const double slowest = 1e-5;  // U_0, m/s
+  const double slowest = 1e-5;  // U_0, m/s, as in walkers/physics/edges.py
   Batch &b = batch;
   for (int k = 0; k < b.count; k++) {
     const Vec n = b.inverse[k] * b.d.get(k), v = b.v.get(k), along = v - dot(v, n) * n;

@@ -31,7 +31,8 @@ const char *const HALF_RISE_SPEED = "frictionHalfRiseVelocity";  // s_h, m/s
 class Law : protected Pointers {
 public:
   Law(LAMMPS *lmp, const bool rolling_friction)
-      : Pointers(lmp), rolling_friction_(rolling_friction), has_edges_(false), largest_formation_(0.), film_(0)
+      : Pointers(lmp), rolling_friction_(rolling_friction), has_edges_(false),
+        largest_formation_(0.), film_(0)
   {
     of_engines()[lmp] = this;
   }
@@ -85,7 +86,8 @@ public:
     double **const rises = optional_property(RISE, &create_rise);
     double **const half_rise_speeds = optional_property(HALF_RISE_SPEED, &create_half_rise_speed);
     if (!rises != !half_rise_speeds)
-      error->all(FLERR, "cohesion bridge: a deck has both frictionRise and frictionHalfRiseVelocity");
+      error->all(FLERR,
+                 "cohesion bridge: expected frictionRise and frictionHalfRiseVelocity, or neither");
     if (force->cg_active()) error->cg(FLERR, NAME);
     if (conserves_liquid())
       film_ = static_cast<FixPropertyAtom *>(

@@ -6,7 +6,7 @@
 
        bridge TYPE TYPE RADIUS RADIUS           atom types, radii in m; a wall's radius is "inf"
        [liquid VOLUME SHARE SHARE FILM FILM]    of beads whose liquid is conserved (README.md), m3
-       [edge RESISTANCE]                        of the edges of the meniscus (forces.h), N (s/m)^(2/3)
+       [edge RESISTANCE]                        of moving edges (forces.h), N (s/m)^(2/3)
        range FORMATION RUPTURE SCALE OCTAVES CELLS
        GAP PULL NORMAL SLIDING COUPLING ROLLING
 
