@@ -32,6 +32,7 @@ from walkers.second_engine.scenes import (
 )
 from walkers.templates.bridge_tables import RecordedLaw
 from walkers.templates.deck import BRIDGES_NAME, render_deck
+from walkers.theory.mathieu import turning_rate
 from walkers.theory.motion import Walker, predict_motion
 
 MASS = 4000.0 * 4.0 / 3.0 * pi * LARGE_RADIUS**3
@@ -182,6 +183,11 @@ def test_edges_slow_a_walker_by_a_third_at_a_weak_drive() -> None:
         for edges in ({}, {"liquid.edge_ratio": 1.0})
     )
     assert edged.velocity[0] / plain.velocity[0] == pytest.approx(0.68, abs=0.03)
+
+
+def test_the_alignment_of_a_walker_with_edges_is_unknown() -> None:
+    """The equations of the sideways motion leave edges out."""
+    assert turning_rate(load_case("fig1b", EDGES)) is None
 
 
 def test_the_theory_takes_no_other_effect_beside_edges() -> None:

@@ -26,7 +26,7 @@ I. Cantat, Phys. Fluids 25 (2013) 031303, doi 10.1063/1.4793544 (review).
 
 from __future__ import annotations
 
-from math import cbrt, pi, sqrt
+from math import cbrt, pi
 
 from walkers.physics.bridge import Surfaces
 
@@ -58,11 +58,3 @@ def edge_resistance(surfaces: Surfaces) -> float:
     capillary = cbrt(liquid.viscosity / tension) ** 2
     ideal = _FRONT_AND_REAR * _ROUND * tension * wetted_radius(surfaces) * capillary
     return liquid.edge_ratio * ideal
-
-
-def edge_force(resistance: float, velocity: float) -> float:
-    """Force on a surface along which an edge moves, N; it has the sign of the velocity (m/s).
-
-    ``resistance`` is as from `edge_resistance`.
-    """
-    return resistance * velocity / cbrt(sqrt(velocity**2 + SLOWEST**2))

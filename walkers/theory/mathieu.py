@@ -193,7 +193,13 @@ class _AxialMotion:
 
 
 def _axial_motion(case: Case, walker: Walker) -> _AxialMotion | None:
-    """The axial motion of the dimer of a case; None if it is not periodic."""
+    """The axial motion of the dimer of a case.
+
+    None if it is not periodic, and with edges that resist (`walkers.physics.edges`), for which the
+    sideways motion has no equations here.
+    """
+    if walker.edges.any():
+        return None
     dimer = dimer_of(case)
     frequency = case.excitation.frequency
     peak = case.excitation.peak_acceleration

@@ -197,7 +197,7 @@ def predict_motion(  # noqa: PLR0913
     cycles
         Largest number of cycles; the integration ends earlier if the motion is periodic.
     steps_per_cycle
-        Number of time steps per cycle.
+        Number of time steps per cycle; at least `STEPS_WITH_EDGES` if edges resist.
     effect
         A further force law: a function compiled by numba, and its K parameters for each walker,
         shape (N, K). A step consists of two implicit Euler stages
@@ -220,7 +220,8 @@ def predict_motion(  # noqa: PLR0913
     ExtraMissing
         If the packages of the extra ``theory`` are not installed.
     ValueError
-        If the shapes of the arguments do not broadcast.
+        If the shapes of the arguments do not broadcast, or if there is an effect and edges
+        resist.
     """
     require("theory")
     from walkers.theory.stepping import edge_forces, integrate

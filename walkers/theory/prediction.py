@@ -264,7 +264,8 @@ def alignment_of(case: Case) -> dict[str, Any]:
           (`walkers.theory.mathieu`); whether small angles are ``stable`` in it; the
           ``largest_stable_v`` on a level substrate; ``rolling_rate``, the growth rate in it, 1/s
         - ``rate``: the growth rate with sliding contacts and spinning beads, 1/s (negative: decay;
-          at 1° if there is rolling friction); None if the axial motion is not periodic, and without
+          at 1° if there is rolling friction); None if the axial motion is not periodic, if edges of
+          menisci resist, and without
           a drive
         - ``rolling_friction``: its coefficient in the case
         - ``stands``: on a level substrate, whether the dimer stays on the axis; None without a

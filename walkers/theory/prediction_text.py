@@ -123,7 +123,7 @@ def _alignment_if_slipping_text(alignment: Mapping[str, Any]) -> str:
     """
     rate = alignment["rate"]
     if rate is None:
-        return "unknown: the axial motion is not periodic"
+        return "unknown: the axial motion is not periodic, or edges of menisci resist"
     change = "grow" if rate > 0.0 else "decay"
     text = f"small angles {change} by {abs(rate):.3g}/s"
     if alignment["rolling_friction"]:
