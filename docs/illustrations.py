@@ -29,7 +29,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from docs import tables
-from studies import effects
+from studies import effects, frictions
 from studies.literature import experiments
 from studies.literature.benchmarks import curve_of, published
 from studies.literature.checks import LITERATURE
@@ -363,6 +363,19 @@ def _effects() -> Illustration:
     return Illustration((file,), cases, make)
 
 
+def _frictions() -> Illustration:
+    """The table of `studies.frictions`, which takes half an hour."""
+    file = "figures/frictions.md"
+
+    def cases() -> list[Case]:
+        return list(frictions.facts().experiments.values())
+
+    def make(_out: Path, docs: Path) -> None:
+        _write_page(docs / file, frictions.COMMAND, frictions.rows())
+
+    return Illustration((file,), cases, make)
+
+
 def _validation() -> Illustration:
     """All comparisons of `studies.literature`, and a figure of its benchmarks."""
     figure_file = "figures/benchmarks.png"
@@ -531,6 +544,7 @@ for _shown in _SWEEP_FIGURES:
     ILLUSTRATIONS[_shown.name] = _sweep(_shown)
 ILLUSTRATIONS["pile-climbs"] = _climbs()
 ILLUSTRATIONS["unexplained"] = _effects()
+ILLUSTRATIONS["frictions"] = _frictions()
 ILLUSTRATIONS["validation"] = _validation()
 ILLUSTRATIONS["others"] = _repeated_experiments()
 ILLUSTRATIONS["calibration"] = _calibration()
