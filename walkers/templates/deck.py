@@ -466,6 +466,7 @@ def _template_values(plan: Plan, layout: DeckLayout, files: Mapping[str, str]) -
     """The values that the blocks of a deck use, by the names that they have there."""
     case = plan.case
     contacts = [contact for contact, _ in plan.surfaces]
+    frictions = [contact.friction for contact in contacts]
     liquid = _scalable_liquid(plan)
     start_velocity = _start_velocity(case.excitation)
     parameters = _parameters(plan, contacts, liquid)
@@ -485,6 +486,7 @@ def _template_values(plan: Plan, layout: DeckLayout, files: Mapping[str, str]) -
         "vector_along": vector_along,
         "suffixes": suffixes(len(case.excitation.harmonics)),
         "contacts": [contact_values(contact) for contact in contacts],
+        "friction_grows": any(friction.grows for friction in frictions),
         "moduli": [contact.youngs_modulus for contact in (*contacts, case.contact)],
         "scalable_liquid": liquid,
         "search": _neighbour_search(plan),

@@ -158,7 +158,10 @@ def turning_rate(case: Case) -> float | None:
         return None
     frequency = case.excitation.frequency
     speeds = np.maximum(np.abs(axial.sliding), _SLOWEST)
-    sliding_resistance = walker.friction_at(speeds) * axial.normal / speeds
+    coefficients = []
+    for friction, speed in zip(case.contact.friction.of_dimer, speeds, strict=True):
+        coefficients.append(friction.coefficient(speed))
+    sliding_resistance = np.array(coefficients) * axial.normal / speeds
     rolling_resistance = _resistance_to_rolling(case, axial)
     slopes = _sideways_slopes(
         dimer_of(case), walker.resistances, axial, sliding_resistance, rolling_resistance

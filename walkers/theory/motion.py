@@ -90,14 +90,6 @@ class Walker:
         asymmetry: FloatArray = (first - second) / self.radii.sum(axis=0)
         return asymmetry
 
-    def friction_at(self, speeds: FloatArray) -> FloatArray:
-        """Coefficients of friction of the contacts of one walker.
-
-        Sliding speeds are in m/s; these and the coefficients have the shape (3, ...).
-        """
-        growth: FloatArray = self.friction_rise * speeds / (speeds + self.half_rise_velocity)
-        return self.friction + growth
-
     @classmethod
     def of_case(cls, case: Case) -> Walker:
         """The walker of a case: friction, weight, and the forces and resistances of its bridges."""
@@ -112,8 +104,7 @@ class Walker:
         resistances = np.array([resistances_at_rest(case, *pair) for pair in surfaces]).T
         if first > second:  # the coupling C is computed with the smaller bead as body 1
             resistances[1, 2] *= -1.0
-        friction = case.contact.friction
-        laws = np.array([friction.at_walls, friction.at_walls, friction.between_beads])
+        laws = np.array(case.contact.friction.of_dimer)
         at_rest, rise, half_rise_velocity = laws.T[..., None]
         return cls(
             radii=np.array(dimer.radii)[:, None],

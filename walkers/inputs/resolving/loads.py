@@ -119,10 +119,11 @@ def friction_rate(case: Setup, bridged: Iterable[tuple[float, Sequence[float]]])
         Σ(7/2 μ'N/m) of the bead for which it is largest, 1/s; 0 if no friction grows with the
         velocity. Loads are those of a bead alone, without beads above it.
     """
-    at_walls = case.contact.friction.at_walls.slope
-    between_beads = case.contact.friction.between_beads.slope
-    if not at_walls and not between_beads:
+    friction = case.contact.friction
+    if not friction.grows:
         return 0.0
+    at_walls = friction.at_walls.slope
+    between_beads = friction.between_beads.slope
     acceleration = case.environment.gravity + case.excitation.peak_acceleration
     largest = 0.0
     damping = case.boundary.geometry.damping

@@ -170,6 +170,11 @@ class Friction(ConfigTable):
     )
 
     @property
+    def grows(self) -> bool:
+        """Whether any of the two grows with the velocity."""
+        return self.between_beads.rise > 0.0 or self.at_walls.rise > 0.0
+
+    @property
     def between_beads(self) -> SlidingFriction:
         """The law of friction between two beads."""
         return _law_of(self.bead_bead)
@@ -178,6 +183,11 @@ class Friction(ConfigTable):
     def at_walls(self) -> SlidingFriction:
         """The law of friction between a bead and the boundary."""
         return _law_of(self.bead_wall)
+
+    @property
+    def of_dimer(self) -> tuple[SlidingFriction, SlidingFriction, SlidingFriction]:
+        """The laws of the three contacts of a dimer: each bead at the boundary, then both beads."""
+        return self.at_walls, self.at_walls, self.between_beads
 
 
 def _law_of(friction: float | FrictionLaw) -> SlidingFriction:
