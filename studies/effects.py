@@ -20,7 +20,8 @@ from walkers.extras import require
 from walkers.inputs.resolving.loads import contact_loads, dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.main import main, new_app
-from walkers.text import aligned
+from walkers.physics.edges import ROUND_EDGE
+from walkers.text import aligned_rows
 from walkers.theory.motion import Walker, predict_motion
 
 COMMAND = "python -m studies.effects"
@@ -32,12 +33,8 @@ _STEPS_PER_CYCLE = 512
 _LIFT = sqrt(140.0)
 """A sphere under the load N rolls at the height h = 140 R (η U R/N)² in a liquid that cavitates."""
 
-_EDGES = 4.70 * 1.682 / 2.0
-"""Viscous force on the edge of a bridge over 2 r_w γ Ca^⅔.
-
-Front and rear resist with 4.70 γ Ca^⅔ per length, along the normal of an edge that moves at
-U cos φ; 1.682 is the integral of cos^(5/3) φ over half of the edge.
-"""
+_EDGES = ROUND_EDGE / 2.0
+"""Viscous force on the edge of a bridge over 2 r_w γ Ca^⅔ (`walkers.physics.edges`)."""
 
 _SLOW = 1e-3
 """Velocity over which the couple of hysteresis changes its sign, m/s."""
@@ -321,11 +318,7 @@ def rows() -> list[dict[str, str]]:
 def effects() -> None:
     """Print what effects that the law leaves out would change: velocities by the theory, mm/s."""
     table = rows()
-    heads = list(table[0])
-    lines = [heads]
-    for texts in table:
-        lines.append(list(texts.values()))
-    print(aligned(lines, right=range(1, len(heads))))
+    print(aligned_rows(table, right=range(1, len(table[0]))))
 
 
 if __name__ == "__main__":

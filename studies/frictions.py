@@ -20,7 +20,7 @@ from walkers.calibration.observations import Observation
 from walkers.extras import require
 from walkers.inputs.tables.case import Case
 from walkers.main import main, new_app
-from walkers.text import aligned
+from walkers.text import aligned_rows
 from walkers.theory.motion import PredictedMotion, Walker, predict_motion
 from walkers.theory.quasistatic import translation
 
@@ -403,11 +403,7 @@ def frictions() -> None:
     It takes half an hour.
     """
     table = rows()
-    heads = list(table[0])
-    lines = [heads]
-    for texts in table:
-        lines.append(list(texts.values()))
-    print(aligned(lines, right=range(1, len(heads) - 1)))
+    print(aligned_rows(table, right=range(1, len(table[0]) - 1)))
 
 
 if __name__ == "__main__":

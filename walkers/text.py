@@ -93,6 +93,14 @@ def aligned(rows: Sequence[Sequence[str]], right: Collection[int] = ()) -> str:
     return "\n".join(lines)
 
 
+def aligned_rows(rows: Sequence[Mapping[str, str]], right: Collection[int] = ()) -> str:
+    """Texts by the heads of their columns as an `aligned` table, with a line of heads."""
+    lines = [list(rows[0])]
+    for row in rows:
+        lines.append(list(row.values()))
+    return aligned(lines, right)
+
+
 def with_unit(words: str, unit: str | None) -> str:
     """A label with its unit in parentheses, if there is one."""
     return f"{words} ({unit})" if unit else words

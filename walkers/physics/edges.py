@@ -30,10 +30,11 @@ from math import cbrt, pi
 
 from walkers.physics.bridge import Surfaces
 
-_FRONT_AND_REAR = 4.70
-"""Force of front and rear per length, over γ Ca^(2/3)."""
-_ROUND = 1.682
-"""Integral of cos^(5/3) φ from -π/2 to π/2."""
+ROUND_EDGE = 4.70 * 1.682
+"""Force on a round edge over γ r_w Ca^(2/3).
+
+It is that of front and rear per length, times the integral of cos^(5/3) φ from -π/2 to π/2.
+"""
 _LARGEST_WETTED_RADIUS = 0.8
 """Largest wetted radius, over the radius of the smaller bead."""
 SLOWEST = 1e-5
@@ -41,7 +42,10 @@ SLOWEST = 1e-5
 
 
 def wetted_radius(surfaces: Surfaces) -> float:
-    """The wetted radius r_w of a bridge between surfaces that touch, m."""
+    """The wetted radius r_w of a bridge between surfaces that touch, m.
+
+    It is that of `walkers.physics.reynolds` at a gap of 0, unless it is limited by the bead.
+    """
     radius = (4.0 * surfaces.reduced_radius * surfaces.volume / pi) ** 0.25
     return float(min(radius, _LARGEST_WETTED_RADIUS * surfaces.radius))
 
@@ -56,5 +60,5 @@ def edge_resistance(surfaces: Surfaces) -> float:
         return 0.0
     tension = liquid.surface_tension
     capillary = cbrt(liquid.viscosity / tension) ** 2
-    ideal = _FRONT_AND_REAR * _ROUND * tension * wetted_radius(surfaces) * capillary
+    ideal = ROUND_EDGE * tension * wetted_radius(surfaces) * capillary
     return liquid.edge_ratio * ideal

@@ -46,9 +46,9 @@ p. N is therefore that at h + σ + h_c. This is an estimate, and it is also used
 liquid does not cavitate.
 
 Left out are the shear of liquid outside the wedge (for immersed spheres 0.9588 in addition to 8/15
-ln; a small bridge has no such liquid); moving contact lines; a pressure at the edge other than that
-of the air (the capillary pressure is part of the pull, as long as the edge is round); and
-cavitation where the pressure is below that of the air.
+ln; a small bridge has no such liquid); moving edges (`walkers.physics.edges`); a pressure at the
+edge other than that of the air (the capillary pressure is part of the pull, as long as the edge is
+round); and cavitation where the pressure is below that of the air.
 
 References
 ----------
