@@ -19,7 +19,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
 from tomli_w import dumps as to_toml
@@ -41,6 +41,9 @@ from walkers.runner.failures import RunBusy
 from walkers.runner.run_directory import locked, run_place
 from walkers.runs.making import OpenRun, open_locked
 from walkers.sweeps.scheduler import SweepOptions, run_sweep
+
+if TYPE_CHECKING:
+    from walkers.second_engine.scenes import Bench
 
 # The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, no rolling friction, one walker
 # that starts on the axis in equilibrium.
@@ -350,6 +353,15 @@ def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     """An empty working directory."""
     monkeypatch.chdir(tmp_path)
     yield tmp_path
+
+
+@pytest.fixture
+def bench(in_folder: Path) -> Iterator[Bench]:
+    """A place for the decks of experiments."""
+    from studies.literature.experiments import workbench
+
+    with workbench() as bench:
+        yield bench
 
 
 def write_engine(path: Path, script: str) -> str:

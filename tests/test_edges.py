@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from math import pi
 from pathlib import Path
 
@@ -74,13 +73,6 @@ def test_without_a_ratio_edges_do_not_resist() -> None:
 
 
 # --- beads with edges alone -----------------------------------------------------------------------
-
-
-@pytest.fixture
-def bench(in_folder: Path) -> Iterator[experiments.Bench]:
-    """A place for decks."""
-    with experiments.workbench() as bench:
-        yield bench
 
 
 def case_of_edges(**changes: object) -> Case:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -66,13 +66,6 @@ def test_the_slope_is_that_of_the_coefficient_at_rest() -> None:
 
 
 # --- a bead that is thrown sliding ----------------------------------------------------------------
-
-
-@pytest.fixture
-def bench(in_folder: Path) -> Iterator[experiments.Bench]:
-    """A place for decks."""
-    with experiments.workbench() as bench:
-        yield bench
 
 
 def dry_case(friction: float | Mapping[str, Any]) -> Case:

@@ -8,7 +8,7 @@ import re
 import shutil
 import subprocess
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import chdir
 from dataclasses import replace
 from math import cos, inf, nan, pi
@@ -115,13 +115,6 @@ def test_benchmarks_pass_and_a_check_that_cannot_be_computed_leaves_the_others(
     assert crosscheck["check"] == "crosscheck"
     assert crosscheck["verdict"] == "ERROR"
     assert "no engine here" in crosscheck["quantity"]
-
-
-@pytest.fixture
-def bench(in_folder: Path) -> Iterator[experiments.Bench]:
-    """A place for the decks of experiments."""
-    with experiments.workbench() as bench:
-        yield bench
 
 
 def test_experiments_of_others_about_a_thrown_bead_pass(bench: experiments.Bench) -> None:
