@@ -40,6 +40,11 @@ def _only_derived(value: object, validation: ValidationInfo) -> object:
     return value
 
 
+_DERIVED = BeforeValidator(_only_derived)
+Indirect = Annotated[T | None, SAME_RUN]
+"""A key that acts through others: None unless it is given, and no determinant of the run."""
+Derived = Annotated[T, _DERIVED, SkipJsonSchema()]
+"""A field that follows from others, which no file has."""
 NUMBER_FORM = "<number>"
 """Tag of a number where a file may have a number or a table."""
 TABLE_FORM = "<table>"
@@ -53,11 +58,6 @@ def _form(value: object) -> str:
 
 NUMBER_OR_TABLE = Discriminator(_form)
 """Annotation of a union of a number and a table, which have the tags above."""
-_DERIVED = BeforeValidator(_only_derived)
-Indirect = Annotated[T | None, SAME_RUN]
-"""A key that acts through others: None unless it is given, and no determinant of the run."""
-Derived = Annotated[T, _DERIVED, SkipJsonSchema()]
-"""A field that follows from others, which no file has."""
 
 
 def key(  # noqa: PLR0913
