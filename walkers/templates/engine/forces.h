@@ -140,7 +140,8 @@ edge_motion(const Batch &b, const int k, const Vec n, const Vec along, const dou
           part_j * along - arm_j * cross(b.omega_j.get(k), n), part_j};
 }
 
-/* Computes the resistances of the edges of the batch. */
+/* Computes the resistances of the edges of the batch: apart from the loop below, which the cube root
+   would keep from computing several contacts at once. */
 inline void measure_edges()
 {
   const double slowest = 1e-5;  // U_0, m/s, as in walkers/physics/edges.py
