@@ -32,6 +32,7 @@ from walkers.arrays import FloatArray
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.physics.dimer import Dimer
+from walkers.physics.edges import SLOWEST
 from walkers.theory.motion import Walker, predict_motion
 from walkers.theory.quasistatic import (
     inertia_matrix,
@@ -44,7 +45,7 @@ LARGEST_STABLE_V = 0.45402316686747424
 """Largest V with stable small angles on a level substrate: the characteristic value b1(q = 2V) is
 zero."""
 _NEUTRAL = 1e-6
-"""Growth per unit of ϑ, or multiplier minus one, that counts as zero."""
+"""Growth per unit of ϑ that counts as zero."""
 _SLOWEST = 1e-4
 """Speed in m/s; a contact that slides more slowly resists sideways sliding as at this speed."""
 _STEPS = 256
@@ -91,7 +92,7 @@ class Alignment:
         slopes[:, 0, 1] = 1.0
         slopes[:, 1, 0] = 4.0 * self.v * np.cos(2.0 * theta) - self.u
         slopes[:, 1, 1] = -2.0 * self.damping
-        multipliers = _multipliers(slopes, pi / _MATHIEU_STEPS)
+        multipliers, _ = _floquet(slopes, pi / _MATHIEU_STEPS)
         return float(np.log(np.abs(multipliers).max()) / pi)
 
 
@@ -119,8 +120,10 @@ def alignment(case: Case) -> Alignment:
     )
 
 
-def _multipliers(slopes: FloatArray, step: float) -> npt.NDArray[np.complex128]:
-    """Floquet multipliers of dx/dt = A(t) x, shape (n,).
+def _floquet(
+    slopes: FloatArray, step: float
+) -> tuple[npt.NDArray[np.complex128], npt.NDArray[np.complex128]]:
+    """Floquet multipliers of dx/dt = A(t) x, shape (n,), and their modes, one a column.
 
     Parameters
     ----------
@@ -134,7 +137,8 @@ def _multipliers(slopes: FloatArray, step: float) -> npt.NDArray[np.complex128]:
     propagator = np.eye(slopes.shape[-1])  # x(t + period) = propagator · x(t)
     for propagator_of_step in expm(slopes * step):
         propagator = propagator_of_step @ propagator
-    return np.linalg.eigvals(propagator).astype(np.complex128)
+    multipliers, modes = np.linalg.eig(propagator)
+    return multipliers.astype(np.complex128), modes.astype(np.complex128)
 
 
 def time_to_turn(rate: float) -> float:
@@ -150,7 +154,8 @@ def turning_rate(case: Case) -> float | None:
     Each contact resists sideways sliding by c = μ(|v|) F/|v|, because friction is opposite to the
     direction of sliding, which is almost along the axis; its bridge resists as along the axis.
     Similarly, rolling friction resists sideways rolling by μ F R/|ω|, with the engine's model of
-    constant torque; it is left out of the axial motion.
+    constant torque; it is left out of the axial motion. Edges that move with the velocity u, almost
+    along the axis, resist their sideways velocity by E/|u|^(1/3) (`walkers.physics.edges`).
     """
     walker = Walker.of_case(case)
     axial = _axial_motion(case, walker)
@@ -166,13 +171,36 @@ def turning_rate(case: Case) -> float | None:
     slopes = _sideways_slopes(
         dimer_of(case), walker.resistances, axial, sliding_resistance, rolling_resistance
     )
-    multipliers = _multipliers(slopes, 1.0 / (frequency * _STEPS))
-    # Beads that spin against each other about their vertical axes, as two wheels in mesh, are not
-    # damped.
-    neutral = np.abs(multipliers - 1.0).argmin()
-    if abs(multipliers[neutral] - 1.0) < _NEUTRAL:
-        multipliers = np.delete(multipliers, neutral)
-    return float(np.log(np.abs(multipliers).max()) * frequency)
+    multipliers, modes = _floquet(slopes, 1.0 / (frequency * len(slopes)))
+    turning = np.delete(multipliers, _mode_of_meshing_spins(dimer_of(case), modes))
+    return float(np.log(np.abs(turning).max()) * frequency)
+
+
+def _mode_of_meshing_spins(dimer: Dimer, modes: npt.NDArray[np.complex128]) -> int:
+    """The mode in which beads spin against each other about the vertical, as two wheels in mesh.
+
+    Only edges of menisci damp it, and it does not turn the dimer.
+
+    Parameters
+    ----------
+    dimer
+        The beads.
+    modes
+        Modes of the variables of `_sideways_slopes`, one a column, shape (7, 7).
+
+    Returns
+    -------
+    int
+        The mode with the largest part of its kinetic energy in these spins.
+    """
+    masses = np.array(dimer.masses)
+    inertias = 0.4 * masses * np.array(dimer.radii) ** 2
+    root_of_energy = np.sqrt(np.concatenate([masses, inertias, inertias]))
+    moving = root_of_energy[:, None] * modes[1:]
+    first, second = dimer.radii
+    in_mesh = root_of_energy * np.array([0.0, 0.0, 0.0, 0.0, second, -first])
+    shares = np.abs(in_mesh @ moving) / np.linalg.norm(moving, axis=0)
+    return int(np.argmax(shares))
 
 
 @dataclass(frozen=True)
@@ -193,16 +221,14 @@ class _AxialMotion:
     """Force along the axis of the second bead on the first, N, shape (steps,)."""
     torque: FloatArray
     """Torque of the other bead on each bead, N m, shape (2, steps)."""
+    velocity: FloatArray
+    """Velocity of the walker on the substrate, m/s, shape (steps,)."""
+    edges: FloatArray
+    """Resistances E of the edges of the three bridges, N (s/m)^(2/3), shape (3,)."""
 
 
 def _axial_motion(case: Case, walker: Walker) -> _AxialMotion | None:
-    """The axial motion of the dimer of a case.
-
-    None if it is not periodic, and with edges that resist (`walkers.physics.edges`), for which the
-    sideways motion has no equations here.
-    """
-    if walker.edges.any():
-        return None
+    """The axial motion of the dimer of a case; None if it is not periodic."""
     dimer = dimer_of(case)
     frequency = case.excitation.frequency
     peak = case.excitation.peak_acceleration
@@ -213,16 +239,23 @@ def _axial_motion(case: Case, walker: Walker) -> _AxialMotion | None:
     if not (motion.periodic[0] and motion.solved[0]):
         return None
     after = motion.series[:, 0]
+    steps = after.shape[1]  # more than asked for if edges resist
     before = np.roll(after, 1, axis=1)
     sliding = (before + after) / 2.0
-    slope = (after - before) * frequency * _STEPS  # dv/dt, m/s²
-    inertial = peak * np.cos(2.0 * pi * (np.arange(_STEPS) + 0.5) / _STEPS) + steady
+    slope = (after - before) * frequency * steps  # dv/dt, m/s²
+    inertial = peak * np.cos(2.0 * pi * (np.arange(steps) + 0.5) / steps) + steady
     gains = inertia_matrix(dimer.sin_delta) / dimer.total_mass
     rolling_rates = rolling_matrix(*dimer.radii)
     _, coupling, rolling = walker.resistances
     couples = coupling * sliding + rolling * (rolling_rates @ sliding)
     total = np.linalg.solve(gains, -slope - np.outer([1.0, 1.0, 0.0], inertial))
-    parallel = total - rolling_rates.T @ couples  # F∥ + f of each contact, N
+    velocity = translation(sliding)
+    # Velocities of the surfaces of the beads, with which their edges move, and of the walker.
+    turning = sliding[:2] - velocity
+    edges = walker.edges[:, 0] * dimer.capillary_scale
+    edge_couples = edges[:2, None] * (_two_thirds(turning) - _two_thirds(velocity))  # over R
+    # F∥ + f of each contact, N
+    parallel = total - rolling_rates.T @ couples - _couples_of_edges(walker, sliding)
     normal = (
         walker.normal_at_rest * dimer.capillary_scale
         + normal_force_matrix(dimer.sin_delta) @ parallel
@@ -237,8 +270,37 @@ def _axial_motion(case: Case, walker: Walker) -> _AxialMotion | None:
         normal=np.maximum(normal, 0.0),  # an open contact has no load
         spin=(translation(sliding) - sliding[:2]) / radii,
         force=masses[0] * (acceleration + inertial) + parallel[0],
-        torque=rolling_torque - radii * parallel[:2] - couples[:2],
+        torque=rolling_torque - radii * (parallel[:2] + edge_couples) - couples[:2],
+        velocity=velocity,
+        edges=edges,
     )
+
+
+def _couples_of_edges(walker: Walker, sliding: FloatArray) -> FloatArray:
+    """The couples of edges on the sliding velocities of the contacts, N, shape (3, steps).
+
+    They are those of `walkers.theory.stepping.edge_forces`.
+    """
+    from walkers.theory.stepping import edge_forces
+
+    parameters = np.concatenate([walker.edges[:, 0], walker.radii[:, 0]])
+    unused = np.zeros((3, 3))
+    columns = []
+    for velocities in sliding.T:
+        _, _, couples = edge_forces(tuple(velocities), unused[0], unused, parameters)
+        columns.append(couples)
+    return np.array(columns).T * walker.force_unit
+
+
+def _two_thirds(velocity: FloatArray) -> FloatArray:
+    """The power 2/3 of velocities, with their signs (`walkers.theory.stepping`)."""
+    return velocity * _slowing(velocity)
+
+
+def _slowing(velocity: FloatArray) -> FloatArray:
+    """The power -1/3 of the speeds with which edges move."""
+    slowing: FloatArray = (velocity**2 + SLOWEST**2) ** (-1.0 / 6.0)
+    return slowing
 
 
 def _resistance_to_rolling(case: Case, axial: _AxialMotion) -> FloatArray:
@@ -316,6 +378,9 @@ def _sideways_slopes(
     s, c, q = resistances[..., None]
     forces = -(sliding_resistance[:, :, None] + s) * sliding - c * rolling
     couples = -c * sliding - (q + rolling_resistance[:, :, None]) * rolling
+    edge_forces, edge_couples = _sideways_edges(dimer, axial)
+    forces += edge_forces
+    couples += edge_couples
     # Rolling friction also opposes the spin across the drive, which the torque of the other bead
     # must overcome.
     couples[:2, :, 0] -= rolling_resistance[:2] * axial.spin
@@ -333,3 +398,43 @@ def _sideways_slopes(
         slopes[:, roll, 0] -= axial.torque[bead] / inertias[bead]
         slopes[:, vertical] = -cosine * between_beads / inertias[bead]
     return slopes
+
+
+def _sideways_edges(dimer: Dimer, axial: _AxialMotion) -> tuple[FloatArray, FloatArray]:
+    """The forces and couples of edges that move across the dimer, as in `_sideways_slopes`.
+
+    The point of contact moves along the surfaces with the velocities of
+    `walkers/templates/engine/forces.h`.
+
+    Returns
+    -------
+    forces, couples : ndarray
+        Rows of coefficients of the variables for each contact, shape (3, steps, 7).
+    """
+    radii = np.array(dimer.radii)
+    sine = dimer.sin_delta
+    cosine = sqrt(1.0 - sine**2)
+    shares = radii / radii.sum()
+    on_beads = _slowing(radii[:, None] * axial.spin)
+    on_substrate = _slowing(axial.velocity)
+    forces, couples = np.zeros((2, 3, len(axial.force), 7))
+    reduced_radius = radii.prod() / radii.sum()
+    for bead, side in enumerate((1.0, -1.0)):
+        velocity = 1 + bead
+        roll = 3 + bead
+        vertical = 5 + bead
+        substrate_drag = axial.edges[bead] * on_substrate
+        forces[bead, :, velocity] = -substrate_drag
+        couples[bead, :, velocity] = radii[bead] * substrate_drag
+        couples[bead, :, roll] = -(radii[bead] ** 2) * axial.edges[bead] * on_beads[bead]
+
+        # The velocity of the edge of the other bridge on this bead.
+        moving = np.zeros((len(axial.force), 7))
+        moving[:, 0] = radii[bead] * sine * axial.spin[bead]
+        moving[:, 1:3] = shares[bead] * np.array([1.0, -1.0])
+        moving[:, roll] = radii[bead] * sine
+        moving[:, vertical] = -radii[bead] * cosine
+        drag = -side * axial.edges[2] * on_beads[bead][:, None] * moving
+        forces[2] += side * shares[bead] * drag
+        couples[2] += reduced_radius * drag
+    return forces, couples
