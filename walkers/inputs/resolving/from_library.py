@@ -49,6 +49,7 @@ _KEYS_OF_LAWS = (
 _OF_SURFACES = (
     "liquid.meniscus_radius",
     "liquid.volume_fraction",
+    "liquid.edge_ratio",
     "liquid.contact_angle",
     "contact.rolling_friction",
     "contact.restitution",
@@ -63,6 +64,8 @@ SUPPLIED = (
     *_OF_SURFACES,
 )
 """Keys that a case may leave out because the library has values or defaults."""
+_WITHOUT_USUAL_VALUES = (*_KEYS_OF_LAWS, "liquid.edge_ratio")
+"""Keys that only surface pairs give: a guess has the range of the calibration."""
 _DESCRIBING_SURFACES = (*_FRICTION, "contact.rolling_friction")
 """Keys that describe surfaces completely."""
 _DESCRIBING_LIQUID = (
@@ -275,7 +278,7 @@ def _source_of(key: str, number: LibraryNumber, liquid: str | None) -> Source:
         law of the case. A number that was calibrated with other liquids is a guess.
     """
     default = unmeasured().get(key)
-    if key in _KEYS_OF_LAWS:  # which have no usual values: a guess keeps the calibrated range
+    if key in _WITHOUT_USUAL_VALUES:
         default = replace(number, calibrated_with=())
     measured = bool(number.source) and not number.calibrated_with
     ends = number.range

@@ -94,6 +94,7 @@ class SurfacePairTable(ConfigTable):
     restitution: Sourced[Number] | None = None
     volume_fraction: Sourced[Number] | None = None
     meniscus_radius: Sourced[units.Length] | None = None
+    edge_ratio: Sourced[Number] | None = None
     contact_angle: Sourced[units.UpToRightAngle] | None = None
 
     @model_validator(mode="after")
