@@ -31,7 +31,7 @@ from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.left_out import LeftOutWarning
 from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.table import SweepTable, table_of
-from walkers.theory.prediction import COULOMB_MODEL, PAPER_FIT, predict
+from walkers.theory.prediction import FRICTION_MODEL, PAPER_FIT, predict
 
 COLOURS = ["#111111", "#1f4e8c"]
 """The first two of `walkers/postprocess/show/style.mplstyle`."""
@@ -712,7 +712,7 @@ def test_the_theory_of_a_sweep_is_a_curve_of_each_model_through_its_velocity_at_
     """Checked at 80 Hz, whose points have the second colour; the curves span their range."""
     sweep = walkers.load(looked_through / "grid")
     figure = sweep.figure(theory=True)
-    assert legend_of(figure)[2:] == [COULOMB_MODEL, PAPER_FIT]
+    assert legend_of(figure)[2:] == [FRICTION_MODEL, PAPER_FIT]
     panel = only_panel(figure)
     points = drawn_series(panel)[1].x
     curves = [line for line in theory_lines(panel) if line.get_color() == COLOURS[1]]

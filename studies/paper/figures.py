@@ -31,7 +31,7 @@ from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.table import table_of
-from walkers.theory.prediction import COULOMB_MODEL, motion_of, predicted_column
+from walkers.theory.prediction import FRICTION_MODEL, motion_of, predicted_column
 from walkers.theory.quasistatic import translation
 
 if TYPE_CHECKING:
@@ -227,7 +227,7 @@ def fig2_threshold(sources: Sources) -> Figure:
         mfc="none",
         label="engine: one run, the drive falls",
     )
-    axes.plot(frequency, theory, "--", color="0.2", lw=0.9, label=COULOMB_MODEL)
+    axes.plot(frequency, theory, "--", color="0.2", lw=0.9, label=FRICTION_MODEL)
     largest = float(np.nanmax([*moving, *theory]))
     axes.set(xlabel="frequency (Hz)", ylabel=r"threshold of motion $\Gamma_\mathrm{c}$")
     axes.set(xticks=frequency, ylim=(0.0, 1.3 * largest))
@@ -249,7 +249,7 @@ def fig4(sources: Sources) -> Figure:
             trajectory = sources.trajectory(row["run"])
             _draw_cycles(panel, trajectory, row, letter)
             panel.set_title(f"{case_title(trajectory.case)}\n$\\Gamma_0$ = {row['gamma0']:.3g}")
-        panel.plot([], [], color="0.3", lw=0.9, label=COULOMB_MODEL)
+        panel.plot([], [], color="0.3", lw=0.9, label=FRICTION_MODEL)
         panel.plot([], [], color="0.3", lw=1.0, ls=_MEASURED_DASHES, label="measured mean")
         legend_below(panel, title="means in mm/s")
     letter_panels(axes)

@@ -30,8 +30,8 @@ _ROUNDS = 3
 """Times that this search is repeated between two neighbours of the trials before."""
 _STRONGEST = 16.0
 """Largest Γ0 at which contacts are tried, over the largest normal force at rest (unit 4πγR̄)."""
-COULOMB_MODEL = "theory: Coulomb friction and drag"
-"""Coulomb friction with the viscous forces of bridges (`motion_of`)."""
+FRICTION_MODEL = "theory: friction and drag"
+"""The friction of the case with the viscous forces of its bridges (`motion_of`)."""
 PAPER_FIT = f"theory: paper's fit, κ = {FRICTION_OF_THE_PAPER * 1e-3:g} s/mm"
 """The model of the paper (`walkers.theory.quasistatic.mean_velocity`), for the cases to which it
 was fitted."""
@@ -79,7 +79,7 @@ def check_applies(*cases: Case) -> None:
 def motion_of(*cases: Case) -> PredictedMotion:
     """Integrate the motion of the walkers of N cases, aligned with the drive.
 
-    Friction is Coulomb's; the bridges are those of the engine.
+    Friction and bridges are those of the engine.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def _smallest_gamma(
 
 
 def _opening(case: Case) -> dict[str, Any]:
-    """Γ0 up to which contacts stay closed with Coulomb friction and viscous bridges.
+    """Γ0 up to which contacts stay closed with friction and viscous bridges.
 
     The motion is periodic and has the frequency of the case.
 
@@ -188,7 +188,7 @@ def predict(case: Case) -> dict[str, Any]:
         - ``gamma0`` and ``sin_delta`` of the case
         - ``paper``: ``velocity`` of the model of the paper, its ``friction`` κ (s/m), and the
           ``reason`` if it does not hold
-        - ``viscous``: with Coulomb friction and viscous bridges, ``velocity`` of the walker,
+        - ``viscous``: with friction and viscous bridges, ``velocity`` of the walker,
           ``rotation`` of both beads and ``sliding`` of the three contacts (m/s), ``threshold`` Γc,
           and the ``reason`` if there is no velocity
         - ``detachment``: the Γ0 up to which contacts stay closed, and what happens there
@@ -264,8 +264,7 @@ def alignment_of(case: Case) -> dict[str, Any]:
           (`walkers.theory.mathieu`); whether small angles are ``stable`` in it; the
           ``largest_stable_v`` on a level substrate; ``rolling_rate``, the growth rate in it, 1/s
         - ``rate``: the growth rate with sliding contacts and spinning beads, 1/s (negative: decay;
-          at 1° if there is rolling friction); None if the axial motion is not periodic, if edges of
-          menisci resist, and without
+          at 1° if there is rolling friction); None if the axial motion is not periodic, and without
           a drive
         - ``rolling_friction``: its coefficient in the case
         - ``stands``: on a level substrate, whether the dimer stays on the axis; None without a
@@ -311,10 +310,10 @@ def predicted_column(
     Returns
     -------
     predictions : dict
-        Values of each model (`COULOMB_MODEL`, `PAPER_FIT`), m/s, shape (N,), NaN where it does not
+        Values of each model (`FRICTION_MODEL`, `PAPER_FIT`), m/s, shape (N,), NaN where it does not
         apply. A model is left out if it does not have the column or applies to no case.
     reasons : dict
-        Number of cases by the reason why they lack a value of `COULOMB_MODEL`, or a velocity of
+        Number of cases by the reason why they lack a value of `FRICTION_MODEL`, or a velocity of
         `PAPER_FIT`, and of those outside the range of the paper's measurements, where no model has
         been tested.
     """
@@ -332,17 +331,17 @@ def predicted_column(
     if not applicable:
         return {}, dict(reasons)
 
-    by_coulomb = _velocities_by_coulomb(cases, applicable, reasons, quantity, contact)
+    by_friction = _velocities_by_friction(cases, applicable, reasons, quantity, contact)
     by_paper = np.full(len(cases), np.nan)
     if column in _VELOCITIES:
         by_paper = _velocities_by_the_paper(cases, applicable, reasons)
     _count_outside(cases, reasons)
-    predictions = {COULOMB_MODEL: by_coulomb, PAPER_FIT: by_paper}
+    predictions = {FRICTION_MODEL: by_friction, PAPER_FIT: by_paper}
     applied = {model: values for model, values in predictions.items() if np.isfinite(values).any()}
     return applied, dict(reasons)
 
 
-def _velocities_by_coulomb(
+def _velocities_by_friction(
     cases: Sequence[Case],
     applicable: Sequence[int],
     reasons: Counter[str],

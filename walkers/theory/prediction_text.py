@@ -40,7 +40,7 @@ def prediction_text(prediction: Mapping[str, Any], result: Mapping[str, Any] | N
     rows = [
         _HEAD,
         _row(f"paper's fit, κ = {paper['friction'] * 1e-3:g} s/mm", paper),
-        _row("Coulomb friction and drag", prediction["viscous"]),
+        _row("friction and drag", prediction["viscous"]),
         _engine_row(result),
     ]
     notes = [
@@ -88,7 +88,7 @@ def _row(name: str, model: Mapping[str, Any]) -> list[str]:
 
 def _contacts_text(opening: Mapping[str, Any]) -> str:
     """Up to which drive the contacts stay closed."""
-    closed = f"with Coulomb friction and drag stay closed up to about Γ0 = {opening['gamma']:.2g}"
+    closed = f"with friction and drag stay closed up to about Γ0 = {opening['gamma']:.2g}"
     if opening["reason"]:
         return f"{closed}; beyond, {opening['reason']}"
     return f"{closed}, the strongest drive tried"
@@ -123,7 +123,7 @@ def _alignment_if_slipping_text(alignment: Mapping[str, Any]) -> str:
     """
     rate = alignment["rate"]
     if rate is None:
-        return "unknown: the axial motion is not periodic, or edges of menisci resist"
+        return "unknown: the axial motion is not periodic"
     change = "grow" if rate > 0.0 else "decay"
     text = f"small angles {change} by {abs(rate):.3g}/s"
     if alignment["rolling_friction"]:
