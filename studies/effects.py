@@ -1,4 +1,4 @@
-"""What effects that the bridge law leaves out would change in the theory of the dimer.
+"""What effects beyond the bridge law would change in the theory of the dimer.
 
 ``python -m studies.effects`` prints the table. docs/explanation/unexplained.md explains the effects
 and shows the table. SI units. Nothing here changes the law or the engine.
@@ -20,9 +20,9 @@ from walkers.extras import require
 from walkers.inputs.resolving.loads import contact_loads, dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.main import main, new_app
-from walkers.physics.edges import ROUND_EDGE
 from walkers.text import aligned_rows
 from walkers.theory.motion import Walker, predict_motion
+from walkers.theory.stepping import edge_forces
 
 COMMAND = "python -m studies.effects"
 app = new_app(COMMAND)
@@ -32,9 +32,6 @@ _STEPS_PER_CYCLE = 512
 
 _LIFT = sqrt(140.0)
 """A sphere under the load N rolls at the height h = 140 R (η U R/N)² in a liquid that cavitates."""
-
-_EDGES = ROUND_EDGE / 2.0
-"""Viscous force on the edge of a bridge over 2 r_w γ Ca^⅔ (`walkers.physics.edges`)."""
 
 _SLOW = 1e-3
 """Velocity over which the couple of hysteresis changes its sign, m/s."""
@@ -56,19 +53,14 @@ class Effect:
     """Height of the asperities above which the liquid lifts rolling beads, m; 0: no lift."""
     hysteresis: float = 0.0
     """cos θ of receding edges on beads, minus that of advancing ones."""
-    edges: tuple[float, float] = (0.0, 0.0)
-    """Viscous forces on edges on the substrate and on beads, in the unit of `_EDGES`."""
     merged: bool = False
     """Whether the bridges of both beads to the substrate are one."""
     asperities: float = 0.0
     """Sliding resistance of flows between asperities, over 3πηR."""
-    friction: tuple[float, float] = (1.0, 1.0)
-    """Factors on the friction of beads with the substrate, and with each other."""
     changes: Mapping[str, Any] = field(default_factory=dict)
     """Changes of the cases, by dotted keys."""
 
 
-_ALL_EDGES = (_EDGES, _EDGES)
 _WIDE = {"liquid.meniscus_radius": "150 um"}
 EFFECTS = (
     Effect("the law"),
@@ -80,15 +72,9 @@ EFFECTS = (
     Effect("(c) hysteresis of 20°", hysteresis=0.06),
     Effect("(d) menisci of 20 µm", changes={"liquid.meniscus_radius": "20 um"}),
     Effect("(d) menisci of 150 µm", changes=_WIDE),
-    Effect("(e) edges on the substrate", edges=(_EDGES, 0.0)),
-    Effect("(e) all edges", edges=_ALL_EDGES),
-    Effect("(e) all edges, more friction", edges=_ALL_EDGES, friction=(1.2, 1.1)),
-    Effect(
-        "(e) all edges, more friction, 150 µm",
-        edges=_ALL_EDGES,
-        friction=(1.4, 1.2),
-        changes=_WIDE,
-    ),
+    Effect("(e) no edges", changes={"liquid.edge_ratio": 0.0}),
+    Effect("(e) edges as estimated", changes={"liquid.edge_ratio": 1.0}),
+    Effect("(e) twice the estimate", changes={"liquid.edge_ratio": 2.0}),
     Effect("(f) asperities", asperities=1.0),
     Effect("(f) asperities, ten times", asperities=10.0),
 )
@@ -124,7 +110,7 @@ def _contact_radii(case: Case) -> FloatArray:
 
 
 def _terms(case: Case, effect: Effect) -> FloatArray:
-    """The nine parameters of `effect_terms` for a case, over 4πγR̄."""
+    """The ten parameters of `effect_terms` for a case, forces over 4πγR̄."""
     liquid = case.liquid.of_bridges
     tension = liquid.surface_tension
     radii = _contact_radii(case)
@@ -136,10 +122,9 @@ def _terms(case: Case, effect: Effect) -> FloatArray:
     wetted_on_beads = wetted_radii[:2] + wetted_radii[2]
     couples = 2.0 * tension * effect.hysteresis * wetted_on_beads
 
-    on_substrate, on_beads = effect.edges
-    edges = np.array([on_substrate * wetted_radii[:2], on_beads * wetted_on_beads])
-    forces_on_edges = 2.0 * tension * np.cbrt(liquid.viscosity / tension) ** 2 * edges
-    return np.concatenate([lifts, couples, *forces_on_edges]) / dimer_of(case).capillary_scale
+    dimer = dimer_of(case)
+    forces = np.concatenate([lifts, couples]) / dimer.capillary_scale
+    return np.concatenate([forces, Walker.of_case(case).edges[:, 0], dimer.radii])
 
 
 def _lost_loads(case: Case, effect: Effect) -> FloatArray:
@@ -182,8 +167,8 @@ def effect_terms(
         Friction of the contacts, shape (3, 3): for each the coefficient at rest, its rise, and the
         velocity of half of the rise.
     terms
-        Sizes of the effects, shape (9,): lift of the contacts, couples of hysteresis on the beads,
-        forces on edges on the substrate, and on beads.
+        Sizes of the effects, shape (10,): lift of the contacts, couples of hysteresis on the beads,
+        and the parameters of `walkers.theory.stepping.edge_forces`.
 
     Returns
     -------
@@ -192,8 +177,6 @@ def effect_terms(
     """
     lifts = terms[0:3]
     hysteresis = terms[3:5]
-    edges_on_substrate = terms[5:7]
-    edges_on_beads = terms[7:9]
     velocity = 0.5 * (sliding[0] + sliding[1] - sliding[2])
     spins = (velocity - sliding[0], velocity - sliding[1])  # velocities -R dφ/dt
     entraining = (
@@ -207,17 +190,11 @@ def effect_terms(
             lift = lifts[contact] * abs(entraining[contact])
             friction[contact, :2] *= max(0.0, 1.0 - lift / normal[contact])
 
-    forces = np.zeros(3)
-    couples = np.zeros(3)
+    friction, forces, couples = edge_forces(sliding, normal, friction, terms[5:10])
     for bead in range(2):
-        spin = spins[bead]
-        moved = np.sign(velocity) * abs(velocity) ** (2.0 / 3.0)
-        turned = np.sign(spin) * abs(spin) ** (2.0 / 3.0)
-        forces[bead] = edges_on_substrate[bead] * moved
-        turning = edges_on_beads[bead] * turned
-        turning += hysteresis[bead] * np.tanh(spin / _SLOW)
-        couples += 0.5 * (forces[bead] + turning) * np.array([1.0, 1.0, -1.0])
-        couples[bead] -= forces[bead] + turning
+        turning = hysteresis[bead] * np.tanh(spins[bead] / _SLOW)
+        couples += 0.5 * turning * np.array([1.0, 1.0, -1.0])
+        couples[bead] -= turning
     return friction, forces, couples
 
 
@@ -272,19 +249,17 @@ def row(effect: Effect) -> dict[str, str]:
 
 
 def _walkers(cases: Sequence[Case], effect: Effect, lost: FloatArray) -> Walker:
-    """The walkers of N cases with the friction, loads and sliding resistances of an effect.
+    """The walkers of N cases with the loads and sliding resistances of an effect.
 
     ``lost`` is as from `_lost_loads`, shape (N, 3).
     """
     walker = Walker.joined([Walker.of_case(case) for case in cases])
-    on_substrate, between_beads = effect.friction
-    factors = np.array([on_substrate, on_substrate, between_beads])
+    # `effect_terms` has the forces of edges: the theory takes one further force law.
+    walker = replace(walker, edges=np.zeros_like(walker.edges))
     resistances = walker.resistances.copy()
     resistances[0] += effect.asperities * np.array([_squeezing(case) for case in cases]).T
     return replace(
         walker,
-        friction=walker.friction * factors[:, None],
-        friction_rise=walker.friction_rise * factors[:, None],
         normal_at_rest=walker.normal_at_rest - lost.T,
         resistances=resistances,
     )
@@ -302,10 +277,9 @@ def _force_at_large_bead(case: Case, effect: Effect, terms: FloatArray, lost: Fl
     """
     lift = terms[0] * _VELOCITY_OF_SIZES
     couple = terms[3]
-    edges = (terms[5] + terms[7]) * _VELOCITY_OF_SIZES ** (2.0 / 3.0)
     sliding = effect.asperities * _squeezing(case)[0] * _VELOCITY_OF_SIZES
     sliding /= dimer_of(case).capillary_scale
-    return float(lift + couple + edges + sliding + lost[0])
+    return float(lift + couple + sliding + lost[0])
 
 
 def rows() -> list[dict[str, str]]:
@@ -316,7 +290,7 @@ def rows() -> list[dict[str, str]]:
 
 @app.default
 def effects() -> None:
-    """Print what effects that the law leaves out would change: velocities by the theory, mm/s."""
+    """Print what effects beyond the law would change: velocities by the theory, mm/s."""
     table = rows()
     print(aligned_rows(table, right=range(1, len(table[0]))))
 
