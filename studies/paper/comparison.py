@@ -22,12 +22,13 @@ from studies.paper.sources import (
     sweep_of,
     thresholds_with_theory,
 )
+from walkers.calibration.file import Calibration
 from walkers.calibration.observations import LEAST_SPEED, Observation, quantities_of_runs
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION_OF_ONE_G
 from walkers.postprocess.measure.results import json_numbers
 from walkers.runner.run_directory import case_of
-from walkers.theory.prediction import COULOMB_MODEL, PAPER_FIT, predicted_column
+from walkers.theory.prediction import FRICTION_MODEL, PAPER_FIT, predicted_column
 
 Numbers = Mapping[str, Mapping[str, float]]
 """Quantities of walkers, SI units and degrees, by experiment of the calibration and by name."""
@@ -89,7 +90,7 @@ def compare(sources: Sources) -> dict[str, Any]:
         sets[name] = {
             "agree": sum(fact["agree"][name] for fact in counted),
             "of": len(counted),
-            "parameters": _parameter_texts(cases_of_set),
+            "parameters": _parameter_texts(parameter_sets()[name].calibration, cases_of_set),
         }
     thresholds: Any = thresholds_with_theory(sources).to_dict("records")
     return {
@@ -116,23 +117,23 @@ def _measured_numbers(sources: Sources, parameter_set: str) -> Numbers:
 
 
 def _numbers_by_theory(cases: Mapping[str, Case]) -> Numbers:
-    """The same numbers by Coulomb friction and viscous forces.
+    """The same numbers by friction and viscous forces.
 
     NaN for quantities that this model does not have, and where contacts open.
     """
     numbers: dict[str, dict[str, float]] = {experiment: {} for experiment in cases}
     for quantity in {observation.quantity for observation in ruby().file.observations}:
         predictions, _ = predicted_column(list(cases.values()), quantity)
-        values = predictions.get(COULOMB_MODEL, np.full(len(cases), nan))
+        values = predictions.get(FRICTION_MODEL, np.full(len(cases), nan))
         for experiment, value in zip(cases, values, strict=True):
             numbers[experiment][quantity] = float(value)
     return numbers
 
 
-def _parameter_texts(cases: Mapping[str, Case]) -> dict[str, str]:
+def _parameter_texts(calibration: Calibration, cases: Mapping[str, Case]) -> dict[str, str]:
     """Calibrated parameters as a case file writes them, by their symbols."""
     parameter_texts = {}
-    for name, parameter in ruby().file.parameters.items():
+    for name, parameter in calibration.file.parameters.items():
         experiment = next(iter(cases))
         if parameter.experiments:
             experiment = parameter.experiments[0]
@@ -258,7 +259,7 @@ def _velocities_by_model(table: pd.DataFrame, column: str) -> pd.DataFrame:
         predictions, _ = predicted_column(cases, "velocity")
     velocities = table[[column]].astype(float).round(_DECIMALS)
     velocities["engine"] = table["velocity"]
-    velocities["theory"] = predictions.get(COULOMB_MODEL, nan)
+    velocities["theory"] = predictions.get(FRICTION_MODEL, nan)
     velocities["curve"] = predictions.get(PAPER_FIT, nan)
     return velocities
 

@@ -198,6 +198,10 @@ def _write_comparison(comparison: dict[str, Any], to: Path) -> list[Path]:
     page = to / f"{COMPARISON}.md"
     record = to / f"{COMPARISON}.json"
     to.mkdir(parents=True, exist_ok=True)
-    write_bytes(page, rendered("studies.paper", "comparison.md.j2", comparison).encode())
+    labels: dict[str, None] = {}  # in order, each once
+    for facts in comparison["sets"].values():
+        labels |= dict.fromkeys(facts["parameters"])
+    shown = comparison | {"labels": list(labels)}
+    write_bytes(page, rendered("studies.paper", "comparison.md.j2", shown).encode())
     write_json(record, comparison)
     return [page, record]

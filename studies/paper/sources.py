@@ -6,12 +6,14 @@ Nothing is run here: `studies.paper.make` makes missing runs.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from studies.friction_laws import calibration_with
 from walkers.calibration.file import Calibration, load_calibration
 from walkers.errors import WalkersError
 from walkers.inputs.reading import load_case
@@ -26,18 +28,26 @@ from walkers.theory.prediction import threshold
 if TYPE_CHECKING:
     import pandas as pd
 
-_FRICTION_ONLY = {
-    "friction_wall": 0.311,
-    "friction_slide": 0.311,
-    "friction_bead": 0.083,
-    "rolling_friction": 0.0035,
-    "roughness": 2000.0,
-    "meniscus_radius": 40.0,
-}
-"""A parameter set with surfaces so rough that viscous forces are small.
+_ROUNDED = "estimated surfaces"
+"""The set of the calibration that the shipped cases have, but for the roughness of each contact."""
+_COULOMB = ("coulomb-two-walls", "coulomb-one-wall")
+"""Laws of `studies.friction_laws` whose sets are compared with the shipped parameters."""
 
-It is outside of the ranges of the calibration, in the units of its file.
-"""
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """Values of the parameters of a calibration.
+
+    Attributes
+    ----------
+    calibration
+        The calibration. All have the same experiments and facts.
+    values
+        Its parameters by name, in the units of its file; None: the shipped cases as they are.
+    """
+
+    calibration: Calibration
+    values: Mapping[str, float] | None = None
 
 
 @cache
@@ -47,29 +57,37 @@ def ruby() -> Calibration:
 
 
 @cache
-def parameter_sets() -> dict[str, Mapping[str, float] | None]:
+def parameter_sets() -> dict[str, ParameterSet]:
     """Parameter sets to compare, by name.
 
-    They are the shipped cases as they are (None), the sets of the calibration, and one with
-    friction alone.
+    They are the shipped cases as they are, another set of their calibration, and sets with
+    Coulomb's law.
     """
-    return {"shipped": None, **ruby().file.sets, "friction only": _FRICTION_ONLY}
+    sets = {"shipped": ParameterSet(ruby())}
+    calibrations = [ruby(), *map(calibration_with, _COULOMB)]
+    for calibration in calibrations:
+        for name, values in calibration.file.sets.items():
+            if name != _ROUNDED:
+                sets[name] = ParameterSet(calibration, values)
+    return sets
 
 
 def facts_sweep_name(parameter_set: str) -> str:
     """The name of the sweep of all experiments of the calibration with a parameter set."""
-    return f"facts-{parameter_set.replace(' ', '-')}"
+    words = parameter_set.lower().replace(",", "").split()
+    return f"facts-{'-'.join(words)}"
 
 
 def sweep_of(name: str) -> SweepDefinition:
     """A shipped sweep, or the sweep of a parameter set by its name (`facts_sweep_name`)."""
-    for parameter_set, values in parameter_sets().items():
-        if name != facts_sweep_name(parameter_set):
+    for label, parameter_set in parameter_sets().items():
+        if name != facts_sweep_name(label):
             continue
-        if values is None:
-            return ruby().sweep(name)
-        row = [values[parameter] for parameter in ruby().file.parameters]
-        return ruby().sweep(name, np.array([row]))
+        calibration = parameter_set.calibration
+        if parameter_set.values is None:
+            return calibration.sweep(name)
+        row = [parameter_set.values[parameter] for parameter in calibration.file.parameters]
+        return calibration.sweep(name, np.array([row]))
     return load_sweep(name)
 
 
