@@ -44,8 +44,9 @@ from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case
 from walkers.inputs.tables.case import Case
 from walkers.inputs.toml import read_toml
+from walkers.postprocess.measure import large_arrays, piles
 from walkers.postprocess.measure.dump import BinaryDump, DumpError, local_frames
-from walkers.postprocess.measure.motion import read_motion
+from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.measure.results import measure, read_results
 from walkers.postprocess.show.paraview import write_vtk
 from walkers.postprocess.show.report.run import result_html
@@ -459,6 +460,54 @@ def test_motion_takes_little_more_memory_than_its_arrays(
     frames, beads, _ = motion.position.shape
     assert motion.mean_spin is not None
     assert 96.0 <= peak / (frames * beads) < 130.0
+
+
+@pytest.fixture
+def large_motion(pile_run: Path, monkeypatch: pytest.MonkeyPatch) -> Motion:
+    """The motion of a pile whose arrays are all on the disk."""
+    monkeypatch.setattr(large_arrays, "LARGEST_IN_MEMORY", 0)
+    return read_motion(pile_run)
+
+
+def test_a_motion_on_the_disk_takes_no_memory(
+    run_directory: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As the motion above, which takes 96 bytes a bead and frame."""
+    directory = run_directory(dimers={"replicates": 40}, run={**SHORT, "samples_per_cycle": 20})
+    monkeypatch.setattr(large_arrays, "LARGEST_IN_MEMORY", 0)
+    read_motion(directory)  # what is imported and kept takes memory once
+    tracemalloc.start()
+    motion = read_motion(directory)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    frames, beads, _ = motion.position.shape
+    assert peak / (frames * beads) < 20.0
+
+
+def test_a_motion_on_the_disk_is_that_in_memory(pile_run: Path, large_motion: Motion) -> None:
+    motion = read_motion(pile_run)
+    np.testing.assert_array_equal(large_motion.position, motion.position)
+    np.testing.assert_array_equal(large_motion.velocity, motion.velocity)
+    np.testing.assert_array_equal(large_motion.spin, motion.spin)
+
+
+def test_a_pile_on_the_disk_has_the_same_numbers(pile_run: Path, large_motion: Motion) -> None:
+    assert piles.measure(large_motion).numbers == pytest.approx(
+        piles.measure(read_motion(pile_run)).numbers, rel=0.0, abs=0.0, nan_ok=True
+    )
+
+
+def test_a_motion_on_the_disk_leaves_no_file(pile_run: Path, large_motion: Motion) -> None:
+    names = {path.name for path in pile_run.iterdir()}
+    del large_motion
+    assert {path.name for path in pile_run.iterdir()} == names
+    assert not any(name.startswith("tmp") for name in names)
+
+
+def test_a_motion_that_no_disk_can_hold_says_how_much_it_needs(tmp_path: Path) -> None:
+    """240 TB: more than a file may have."""
+    with pytest.raises(DumpError, match=r"needs 2\.4e\+05 GB on its disk"):
+        large_arrays.empty_array((100_000, 100_000_000, 3), tmp_path)
 
 
 @dataclass(frozen=True)

@@ -23,6 +23,7 @@ from walkers.inputs.tables.bodies import Walkers
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import Excitation
 from walkers.postprocess.measure.dump import BinaryDump, DumpError, NoNumberError, local_frames
+from walkers.postprocess.measure.large_arrays import empty_array
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runner.run_directory import (
     SEGMENT_NAME,
@@ -555,7 +556,7 @@ def _read_vectors(segments: Sequence[_Segment]) -> dict[str, FloatArray]:
     (rad/s) if the dumps have them.
 
     Each array is filled once: a stack of whole frames, and copies of parts of it, would need twice
-    the memory.
+    the memory. Large ones are on the disk (`walkers.postprocess.measure.large_arrays`).
     """
     layout = segments[-1].layout
     names = ["x", "vx", "omegax"]
@@ -564,7 +565,8 @@ def _read_vectors(segments: Sequence[_Segment]) -> dict[str, FloatArray]:
     frames = 0
     for segment in segments:
         frames += len(segment.new_frames)
-    vectors = {name: np.empty((frames, layout.atoms, 3)) for name in names}
+    directory = run_of_segment(segments[0].path)
+    vectors = {name: empty_array((frames, layout.atoms, 3), directory) for name in names}
     frame = 0
     for segment in segments:
         first_columns = {name: segment.layout.bead_columns.index(name) for name in names}
@@ -604,8 +606,10 @@ def _joined(case: Case, segments: Sequence[_Segment]) -> Motion:
     displacement, velocity = prescribed_motion(case.excitation, time)
     if drive_from is not None and drive_from > 0:
         velocity[time == 0.0] = 0.0  # in the last frame at rest the walls do not move yet
-    vectors["x"] -= displacement[:, None]
-    vectors["vx"] -= velocity[:, None]
+    if displacement.any():
+        vectors["x"] -= displacement[:, None]
+    if velocity.any():
+        vectors["vx"] -= velocity[:, None]
 
     cycles = run.cycles
     completed_case = case
