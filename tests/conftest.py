@@ -73,6 +73,13 @@ REFERENCE: dict[str, Any] = {
     # Its speed is that of 60 cycles, 20 of them to settle, to nine digits.
     "run": {"cycles": 24, "settling_cycles": 8},
 }
+COULOMB: dict[str, Any] = {
+    "contact.friction.bead_bead": 0.11,
+    "contact.friction.bead_wall": 0.175,
+    "liquid.edge_ratio": 0.0,
+}
+"""Changes of a case of ruby walkers: a friction that does not depend on the velocity, and edges of
+menisci that do not resist."""
 # A shell that starts the tests in the background has SIGINT ignored, by them and all they start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

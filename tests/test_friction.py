@@ -12,7 +12,7 @@ import pytest
 
 import walkers
 from studies.literature import experiments
-from tests.conftest import origins
+from tests.conftest import COULOMB, origins
 from walkers.arrays import FloatArray
 from walkers.errors import InputError
 from walkers.inputs.reading import load_case
@@ -180,10 +180,14 @@ def test_two_ranks_have_the_forces_of_one(growing_scenes: Bench) -> None:
 WALKER = {
     AT_WALL: 0.255,
     BETWEEN_BEADS: {"at_rest": 0.029, "rise": 0.527, "half_rise_velocity": "86 mm/s"},
+    "liquid.edge_ratio": 0.0,
     "contact.rolling_friction": 0.0,
     "dimers.replicates": 2,
 }
-"""Changes of ``fig1b``: a friction between the beads that grows with the velocity."""
+"""Changes of ``fig1b``: a friction between the beads that grows with the velocity.
+
+Edges of menisci do not resist, so that friction alone differs from Coulomb's law.
+"""
 
 
 def test_the_second_engine_leaves_out_the_growth_with_the_friction() -> None:
@@ -208,6 +212,7 @@ def test_theory_and_engine_agree_on_a_walker(growing: str, in_folder: Path) -> N
         BETWEEN_BEADS: 0.11,
         AT_WALL: 0.2,
         growing: {"at_rest": 0.08, "rise": 0.3, "half_rise_velocity": "20 mm/s"},
+        "liquid.edge_ratio": 0.0,
         "contact.rolling_friction": 0.0,
         "dimers.replicates": 2,
         "drive.peak_acceleration": "8 g",
@@ -236,7 +241,7 @@ def test_the_deck_has_both_numbers_as_parameters() -> None:
 
 
 def test_a_deck_by_coulombs_law_does_not_know_the_rise() -> None:
-    assert "Rise" not in render_deck(load_case("fig1b")).text
+    assert "Rise" not in render_deck(load_case("fig1b", COULOMB)).text
 
 
 def test_a_fast_rise_shortens_the_time_step() -> None:
@@ -254,7 +259,7 @@ def test_a_fast_rise_shortens_the_time_step() -> None:
 
 
 def test_without_a_rise_friction_limits_no_time_step() -> None:
-    assert limits_of(load_case("fig1b")).friction == np.inf
+    assert limits_of(load_case("fig1b", COULOMB)).friction == np.inf
 
 
 # --- case files -----------------------------------------------------------------------------------
@@ -377,13 +382,28 @@ def test_a_sweep_varies_the_rise() -> None:
     assert rises == [0.2, 0.4]
 
 
-def test_a_table_does_not_take_its_friction_at_rest_from_coulombs_law() -> None:
-    """That of ruby was found with Coulomb's law."""
+@pytest.fixture
+def case_by_coulomb(own_case: Path) -> Path:
+    """A case beside a library whose friction between two beads was found with Coulomb's law."""
+    library = own_case.parent / "library.toml"
+    lines = [line for line in LIBRARY.splitlines() if "rise" not in line]
+    library.write_text("\n".join(lines))
+    return own_case
+
+
+def test_a_library_by_coulombs_law_gives_no_rise(case_by_coulomb: Path) -> None:
+    case = load_case(case_by_coulomb)
+    assert case.contact.friction.between_beads == SlidingFriction(0.03)
+
+
+def test_a_table_does_not_take_its_friction_at_rest_from_coulombs_law(
+    case_by_coulomb: Path,
+) -> None:
     growth = {f"{BETWEEN_BEADS}.rise": 0.4, f"{BETWEEN_BEADS}.half_rise_velocity": "80 mm/s"}
     with pytest.raises(InputError, match=r"bead_bead\.at_rest: missing"):
-        load_case("fig1b", growth)
+        load_case(case_by_coulomb, growth)
 
 
-def test_a_table_without_its_velocity_is_refused() -> None:
+def test_a_table_without_its_velocity_is_refused(case_by_coulomb: Path) -> None:
     with pytest.raises(InputError, match=r"bead_bead\.half_rise_velocity: missing"):
-        load_case("fig1b", {BETWEEN_BEADS: {"at_rest": 0.1, "rise": 0.2}})
+        load_case(case_by_coulomb, {BETWEEN_BEADS: {"at_rest": 0.1, "rise": 0.2}})
