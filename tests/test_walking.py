@@ -18,7 +18,7 @@ import pytest
 from matplotlib.axes import Axes
 
 import walkers
-from tests.conftest import document, make_case
+from tests.conftest import COULOMB, document, make_case
 from walkers.api import compare
 from walkers.errors import InputError, Stopped
 from walkers.files import read_json, write_json
@@ -718,7 +718,7 @@ def test_symmetric_walkers_that_turn_away_tell_that_small_angles_grow_too(
     finished_run: Callable[[Case], walkers.Run],
 ) -> None:
     """All six turn in a longer run: a warning about one of them does not mean that five stay."""
-    (warning,) = finished_run(load_case("symmetric")).result.warnings
+    (warning,) = finished_run(load_case("symmetric", COULOMB)).result.warnings
     assert "1 of 6 walkers turns away from the drive axis" in warning
     assert "; the small angles of 5 others grow too: set run.cycles = " in warning
 
@@ -959,9 +959,10 @@ def make_alone(angle: float = 0.0, **drive: Any) -> Case:
 def make_turning() -> Case:
     """Make a walker that still turns to the axis after 12 cycles, and less and less after 24.
 
-    Its liquid hardly resists.
+    Its liquid hardly resists, and edges of its menisci do not.
     """
-    return make_alone(4.0, peak_acceleration="8 g").with_value_at("liquid.viscosity_ratio", 0.1)
+    changes = {**COULOMB, "liquid.viscosity_ratio": 0.1}
+    return changed_case(make_alone(4.0, peak_acceleration="8 g"), changes)
 
 
 @pytest.fixture(scope="module")
