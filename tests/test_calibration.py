@@ -410,6 +410,7 @@ case  = "fig1b"
 [set]
 drive.frequency     = "90 Hz"
 dimers.replicates   = 1
+liquid.edge_ratio   = 0.0
 run = { cycles = 10, settling_cycles = 6, samples_per_cycle = 10 }
 [parameters.friction]
 keys  = ["contact.friction.bead_wall", "contact.friction.bead_bead"]
