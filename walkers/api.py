@@ -685,7 +685,7 @@ def run(
     >>> import walkers
     >>> one = walkers.run("fig1b", tmp)
     >>> round(1e3 * one.result["velocity"], 3)  # mm/s
-    1.981
+    1.459
     >>> one.walkers[["facing", "steady"]].drop_duplicates("facing").to_dict("list")
     {'facing': [1, -1], 'steady': [True, True]}
     """

@@ -47,8 +47,8 @@ plt.show()
 # walkers stop, and its uncertainty, the fall of the drive in eight cycles; both are in m/s².
 
 falling_drive = {
-    "drive.peak_acceleration": "1.2 g",
-    "drive.ramp": [["0 s", 1], ["1 s", 0.5]],
+    "drive.peak_acceleration": "1 g",
+    "drive.ramp": [["0 s", 1], ["1 s", 0.3]],
     "dimers.replicates": 2,
 }
 run = walkers.run(walkers.load_case("fig1b", falling_drive))

@@ -22,7 +22,7 @@ dimers.replicates  = 2
 
 [axes]
 dimers.sin_delta = { linspace = [0.1, 0.4, 4] }
-drive.gamma0     = { linspace = [0.1, 1.3, 7] }
+drive.gamma0     = { linspace = [0.03, 1.23, 7] }
 """)
 table = walkers.sweep("runs/map.toml").table()
 

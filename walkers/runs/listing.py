@@ -48,7 +48,7 @@ class ListEntry:
     kind
         ``run`` or ``sweep``.
     name
-        Name of the directory without the ending of unfinished runs, such as ``fig1b-06d1d8b89da8``.
+        Name of the directory without the ending of unfinished runs, such as ``fig1b-9845e7cce370``.
     case
         Name of the case; of a sweep, of its base case.
     status
