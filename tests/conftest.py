@@ -45,8 +45,8 @@ from walkers.sweeps.scheduler import SweepOptions, run_sweep
 if TYPE_CHECKING:
     from walkers.second_engine.scenes import Bench
 
-# The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, no rolling friction, one walker
-# that starts on the axis in equilibrium.
+# The walker of the published tables: R 0.3/0.2 mm, Si AK5, 80 Hz, Coulomb's law, no rolling
+# friction, edges of menisci that do not resist, one walker that starts on the axis in equilibrium.
 REFERENCE: dict[str, Any] = {
     "beads": {"material": "ruby"},
     "dimers": {
@@ -60,6 +60,7 @@ REFERENCE: dict[str, Any] = {
         "volume_fraction": 0.01,
         "viscosity_ratio": 1.0,
         "contact_angle": "0 deg",
+        "edge_ratio": 0.0,
     },
     "boundary": {"material": "chromium-coated glass"},
     "contact": {
