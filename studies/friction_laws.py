@@ -59,9 +59,9 @@ def _coulomb(document: Document) -> None:
 
 def _two_wall_frictions(document: Document) -> None:
     """A friction of the substrate in Fig. 4, and one in the other figures."""
-    others = [name for name in document["experiments"] if name not in _ON_SLIDE_OF_FIG_4]
+    not_fig4 = [name for name in document["experiments"] if name not in _ON_SLIDE_OF_FIG_4]
     wall = document["parameters"]["friction_wall"]
-    wall |= {"range": [0.08, 0.5], "experiments": others, "symbol": "wall friction, Figs. 1 to 3"}
+    wall |= {"range": [0.08, 0.5], "experiments": not_fig4, "symbol": "wall friction, Figs. 1 to 3"}
     document["parameters"]["friction_slide"] = wall | {
         "experiments": list(_ON_SLIDE_OF_FIG_4),
         "symbol": "wall friction, Fig. 4",

@@ -67,8 +67,8 @@ def density_of_group(
         The group that is predicted.
     """
     everything = np.sum(list(likelihoods.values()), axis=0)
-    others = [column for name, column in likelihoods.items() if groups[name] != group]
-    without = np.sum(others, axis=0)
+    given = [column for name, column in likelihoods.items() if groups[name] != group]
+    without = np.sum(given, axis=0)
     return float(logsumexp(everything) - logsumexp(without))
 
 
@@ -105,10 +105,10 @@ def _prediction(outcome: Outcome, name: str) -> str:
     """The median of a fact, and 5 to 95 %, predicted from the facts of other groups."""
     emulator = outcome.emulators[name]
     seed = outcome.calibration.file.design.seed
-    others = Posterior.from_emulators(
+    without_group = Posterior.from_emulators(
         list(outcome.emulators.values()), _POINTS, seed, [emulator.observation.group]
     )
-    samples = others.samples
+    samples = without_group.samples
     normal = np.random.default_rng(seed).standard_normal(len(samples))
     scale = emulator.observation.unit[1]
     low, median, high = scale * np.percentile(emulator.numbers(samples, normal), (5, 50, 95))
