@@ -27,9 +27,9 @@ from docs.illustrations import (
     stale,
     without_hashes,
 )
+from studies.paper.make import page_of
 from walkers import load_case
 from walkers.files import read_json
-from walkers.text import rendered
 from walkers.theory.prediction import PAPER_FIT, predicted_column
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -232,7 +232,7 @@ def test_the_page_of_the_comparison_is_of_todays_template() -> None:
     """Its sentences say when a fact agrees, as `Observation.agrees` decides."""
     page = DOCS / "figures" / "comparison.md"
     compared = read_json(page.with_suffix(".json"))
-    assert page.read_text("utf-8") == rendered("studies.paper", "comparison.md.j2", compared)
+    assert page.read_text("utf-8") == page_of(compared)
 
 
 def test_the_table_of_performance_is_the_benchmarks() -> None:

@@ -198,10 +198,20 @@ def _write_comparison(comparison: dict[str, Any], to: Path) -> list[Path]:
     page = to / f"{COMPARISON}.md"
     record = to / f"{COMPARISON}.json"
     to.mkdir(parents=True, exist_ok=True)
-    labels: dict[str, None] = {}  # in order, each once
-    for facts in comparison["sets"].values():
-        labels |= dict.fromkeys(facts["parameters"])
-    shown = comparison | {"labels": list(labels)}
-    write_bytes(page, rendered("studies.paper", "comparison.md.j2", shown).encode())
+    write_bytes(page, page_of(comparison).encode())
     write_json(record, comparison)
     return [page, record]
+
+
+def page_of(comparison: dict[str, Any]) -> str:
+    """The page of a comparison with the paper, in Markdown.
+
+    Parameters
+    ----------
+    comparison
+        As from `studies.paper.comparison.compare`, or read from its JSON file.
+    """
+    labels: dict[str, None] = {}  # of the parameters of all sets, in order, each once
+    for parameter_set in comparison["sets"].values():
+        labels |= dict.fromkeys(parameter_set["parameters"])
+    return rendered("studies.paper", "comparison.md.j2", comparison | {"labels": list(labels)})
