@@ -392,11 +392,11 @@ def test_walkers_that_came_apart_have_no_uncertainty_to_be_computed(
 
 
 def test_what_is_not_computed_stands_right_below_the_head_of_a_result(fig1b: walkers.Run) -> None:
-    """Six values of Fig. 1b have a range, and neither option has been used."""
-    assert not_computed(fig1b.result) == NotComputed(uncertain_values=6, numerical_error=True)
+    """Eight values of Fig. 1b have a range, and neither option has been used."""
+    assert not_computed(fig1b.result) == NotComputed(uncertain_values=8, numerical_error=True)
     _, second, *_ = fig1b.describe().splitlines()
     assert second == (
-        "  uncertainty not computed: 6 uncertain values (--spread), numerical error (--accuracy)"
+        "  uncertainty not computed: 8 uncertain values (--spread), numerical error (--accuracy)"
     )
 
 
