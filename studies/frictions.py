@@ -18,6 +18,7 @@ from studies.paper.sources import ruby
 from walkers.arrays import BoolArray, FloatArray
 from walkers.calibration.observations import Observation
 from walkers.extras import require
+from walkers.inputs.axes import unit_cube
 from walkers.inputs.tables.case import Case
 from walkers.main import main, new_app
 from walkers.text import aligned_rows
@@ -146,19 +147,15 @@ class Facts:
         Cases by the names of the experiments.
     observations
         The facts of the calibration.
-    initial_increase
-        Further facts: the paper says of its one-parameter curve that it reproduces the initial
-        increase of the velocity in Fig. 2.
     """
 
     experiments: Mapping[str, Case]
     observations: Sequence[Observation]
-    initial_increase: Sequence[Observation]
 
     @property
     def groups(self) -> list[str]:
         """The group of each fact."""
-        return [fact.group for fact in (*self.observations, *self.initial_increase)]
+        return [fact.group for fact in self.observations]
 
 
 def facts() -> Facts:
@@ -175,27 +172,7 @@ def facts() -> Facts:
     for fact in calibration.file.observations:
         if not fact.derived and on_axis.keys() >= {*fact.of, *fact.over}:
             observations.append(fact)
-    return Facts(on_axis, observations, _initial_increase())
-
-
-def _initial_increase() -> list[Observation]:
-    """The curve of Fig. 2 at 3 and 4 g, ± 40 %: the paper does not say how near its points are."""
-    increase = []
-    for name, experiments, velocity in (
-        ("curve_3g", ["slide_60_3"], 0.68e-3),
-        ("curve_4g", ["slide_60_4", "slide_90_4"], 1.23e-3),
-    ):
-        fact = Observation.model_validate(
-            {
-                "name": name,
-                "group": "increase",
-                "of": experiments,
-                "value": velocity,
-                "deviation": 0.4 * velocity,
-            }
-        )
-        increase.append(fact)
-    return increase
+    return Facts(on_axis, observations)
 
 
 # --- draws ----------------------------------------------------------------------------------------
@@ -206,11 +183,8 @@ def draws(law: Law, count: int) -> dict[str, FloatArray]:
 
     ``count`` is a power of two.
     """
-    from scipy.stats import qmc
-
-    uniform = qmc.Sobol(len(law.numbers), seed=_SEED).random(count)
-    inside = np.clip(uniform, 1e-9, 1.0 - 1e-9)
-    return {name: PRIORS[name].values(inside[:, k]) for k, name in enumerate(law.numbers)}
+    uniform = unit_cube(len(law.numbers), count, _SEED)
+    return {name: PRIORS[name].values(uniform[:, k]) for k, name in enumerate(law.numbers)}
 
 
 def distances(law: Law, values: Mapping[str, FloatArray], of: Facts) -> FloatArray:
@@ -243,7 +217,7 @@ def _distances_of_batch(
     rows = []
     for numbers in _quantities(motion, list(of.experiments), count):
         row = []
-        for fact in (*of.observations, *of.initial_increase):
+        for fact in of.observations:
             distance = fact.residual(fact.number_from(numbers))
             row.append(_FARTHEST if np.isnan(distance) else distance)
         rows.append(row)
