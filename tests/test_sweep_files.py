@@ -567,6 +567,21 @@ def test_a_key_may_be_a_word_at_some_points_and_a_list_at_others(
     assert [len(rows) for _, rows in seed_groups(table)] == [1, 1, 1]
 
 
+def test_a_key_may_be_a_number_at_some_points_and_a_table_at_others(
+    make_sweep: MakeSweep, tmp_path: Path
+) -> None:
+    """The table of the sweep has the words of the table, by which points are grouped."""
+    growing = {"at_rest": 0.28, "rise": 0.3, "half_rise_velocity": "3.6 mm/s"}
+    sweep = make_sweep(
+        axes={"run": {"seed": [1, 2]}, "contact": {"friction": {"bead_wall": [0.5, growing]}}}
+    )
+    names = [f"base-00000000000{number}" for number in range(4)]
+    table = table_of(SweepRecord(tmp_path / "test", sweep, names)).frame
+    words = "at_rest = 0.28, rise = 0.3, half_rise_velocity = 3.6 mm/s"
+    assert list(table["contact.friction.bead_wall"]) == [0.5, words, 0.5, words]
+    assert [len(rows) for _, rows in seed_groups(table)] == [2, 2]
+
+
 @pytest.fixture
 def thresholds_of_two_descents() -> list[dict[str, Any]]:
     """The thresholds of two descents from 1.2 g in steps of 0.2 g, one of them at 90 Hz.

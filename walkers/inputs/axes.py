@@ -175,7 +175,12 @@ def number_of(key: str, value: Value) -> float:
 
 
 def without_unit(value: Value) -> Any:
-    """A value, or the values of a list, as numbers without units; words stay as they are."""
+    """A value, or the values of a list, as numbers without units; words stay as they are.
+
+    A table, such as a friction that grows with the velocity, becomes words.
+    """
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} = {entry}" for name, entry in value.items())
     if isinstance(value, list):
         return [without_unit(entry) for entry in value]
     if not isinstance(value, str):
