@@ -6,9 +6,8 @@ and shows the table. SI units. Nothing here changes the law or the engine.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from math import pi, sqrt
 from typing import Any
 
@@ -153,7 +152,7 @@ def _common_area(radii: FloatArray, distance: float) -> float:
 def effect_terms(
     sliding: tuple[float, float, float], normal: FloatArray, friction: FloatArray, terms: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Add the effects to the motion; numba compiles this function.
+    """Add the effects to the motion.
 
     Contacts 1 and 2 are those of the beads with the substrate, contact 3 is that of the beads.
 
@@ -198,15 +197,6 @@ def effect_terms(
     return friction, forces, couples
 
 
-@cache
-def _compiled() -> Callable[..., Any]:
-    """`effect_terms` as the theory calls it, compiled once."""
-    from numba import njit
-
-    compiled: Callable[..., Any] = njit(effect_terms)
-    return compiled
-
-
 # --- the table ------------------------------------------------------------------------------------
 
 
@@ -222,7 +212,7 @@ def row(effect: Effect) -> dict[str, str]:
         [case.excitation.frequency for case in all_cases],
         [case.excitation.peak_acceleration for case in all_cases],
         steps_per_cycle=_STEPS_PER_CYCLE,
-        effect=(_compiled(), terms),
+        effect=(effect_terms, terms),
     )
     velocity = dict(zip(cases, 1e3 * motion.velocity, strict=True))
     mean = {}

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
+from numba import typeof
+from numba.core.types import FunctionType
 from scipy.special import mathieu_a, mathieu_b
 
 from tests.conftest import COULOMB, call, document, make_case, to_toml
@@ -34,6 +35,7 @@ from walkers.theory.motion import PredictedMotion, Walker, predict_motion
 from walkers.theory.prediction import alignment_of, motion_of, predict, threshold
 from walkers.theory.prediction_text import prediction_text
 from walkers.theory.quasistatic import CONTACTS, detachment, mass_asymmetry, mean_velocity
+from walkers.theory.stepping import compiled_effect
 
 
 def with_gamma0(case: Case, gamma0: float) -> Case:
@@ -148,7 +150,6 @@ def test_bridges_slow_the_theorys_walker_as_they_do_the_engines(
     np.testing.assert_allclose(of_engine, [*of_theory.values()], rtol=5e-3, atol=tolerance)
 
 
-@njit
 def drag_of_the_first_bead(
     sliding: tuple[float, float, float],
     _normal: FloatArray,
@@ -163,6 +164,13 @@ def drag_of_the_first_bead(
     drag = parameters[0] * 0.5 * (sliding[0] + sliding[1] - sliding[2])
     torques = 0.5 * drag * np.array([-1.0, 1.0, -1.0])
     return parameters[1] * friction, np.array([drag, 0.0, 0.0]), torques
+
+
+def test_the_cache_of_numba_does_not_name_the_function_of_an_effect() -> None:
+    """Otherwise it could not be loaded by programs that lack the module of the function."""
+    effect_type = typeof(compiled_effect(drag_of_the_first_bead))
+    assert isinstance(effect_type, FunctionType)
+    assert "drag" not in str(effect_type)
 
 
 @pytest.mark.slow

@@ -190,8 +190,8 @@ def predict_motion(  # noqa: PLR0913
     steps_per_cycle
         Number of time steps per cycle; at least `STEPS_WITH_EDGES` if edges resist.
     effect
-        A further force law: a function compiled by numba, and its K parameters for each walker,
-        shape (N, K). A step consists of two implicit Euler stages
+        A further force law: a function that numba can compile, and its K parameters for each
+        walker, shape (N, K). A step consists of two implicit Euler stages
         (`walkers.theory.stepping.STAGE`), and at the start of each the function is called for a
         walker with four arguments: the sliding velocities of its contacts (m/s), their normal
         forces (in 4πγR̄), three numbers each; their friction, shape (3, 3), with μ₀, Δμ and the
@@ -215,7 +215,7 @@ def predict_motion(  # noqa: PLR0913
         resist.
     """
     require("theory")
-    from walkers.theory.stepping import edge_forces, integrate
+    from walkers.theory.stepping import compiled_effect, edge_forces, integrate
 
     drive_and_scale = np.broadcast_arrays(
         np.atleast_1d(frequency),
@@ -238,6 +238,8 @@ def predict_motion(  # noqa: PLR0913
     parameters = np.zeros((count, 0))
     if effect is not None:
         force_law, parameters = effect
+        if force_law is not edge_forces:
+            force_law = compiled_effect(force_law)
     sliding, smallest_normal_force, periodic, solved, series = integrate(
         tables, friction, drive, force_law, parameters, cycles, steps_per_cycle
     )

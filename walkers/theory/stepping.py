@@ -6,9 +6,10 @@ Walkers are integrated one by one.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
-from numba import njit
+from numba import cfunc, float64, njit, types
 
 from walkers.arrays import BoolArray, FloatArray
 from walkers.physics.edges import SLOWEST
@@ -19,6 +20,12 @@ Effect = Callable[
     [PerContact, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]
 ]
 """A further force law, as `walkers.theory.motion.predict_motion` describes it."""
+
+_VECTOR = types.Array(float64, 1, "C")
+_MATRIX = types.Array(float64, 2, "C")
+_RESULTS = types.Tuple((_MATRIX, _VECTOR, _VECTOR))  # type: ignore[no-untyped-call]
+_OF_EFFECT = _RESULTS(types.UniTuple(float64, 3), _VECTOR, _MATRIX, _VECTOR)  # type: ignore[no-untyped-call]
+"""Types of the results and arguments of an `Effect`."""
 
 FINER = 8
 """Number of parts into which a step is divided in which a contact begins to stick or to slip."""
@@ -164,6 +171,18 @@ def integrate(  # noqa: PLR0913, PLR0917
             repeated[walker] = solved[walker] and scatter < _SCATTER * tolerance
         smallest[:, walker] = totals[1]
     return means, smallest, repeated, solved, series
+
+
+@cache
+def compiled_effect(effect: Effect) -> Effect:
+    """Compile a force law from elsewhere so that `integrate` depends on its types alone.
+
+    With the function itself, the compiled `integrate` in the cache of numba would name the module
+    of the function, and could not be loaded where that module is missing.
+    """
+    function = getattr(effect, "py_func", effect)  # of one that numba has compiled
+    compiled: Effect = cfunc(_OF_EFFECT)(function)
+    return compiled
 
 
 @njit(cache=True)
