@@ -29,7 +29,8 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from docs import tables
-from studies import effects, frictions
+from studies import effects, frictions, frictions_by_engine
+from studies.friction_laws import LAWS, calibration_with
 from studies.literature import experiments
 from studies.literature.benchmarks import curve_of, published
 from studies.literature.checks import LITERATURE
@@ -376,6 +377,24 @@ def _frictions() -> Illustration:
     return Illustration((file,), cases, make)
 
 
+def _frictions_by_engine() -> Illustration:
+    """The table of `studies.frictions_by_engine`, which takes an hour on two cores."""
+    file = "figures/frictions-by-engine.md"
+
+    def cases() -> list[Case]:
+        calibrations = map(calibration_with, LAWS)
+        shown: list[Case] = []
+        for calibration in calibrations:
+            medians = np.full((1, len(calibration.file.parameters)), 0.5)
+            shown += calibration.sweep(calibration.name, calibration.values(medians)).cases()
+        return shown
+
+    def make(out: Path, docs: Path) -> None:
+        _write_page(docs / file, frictions_by_engine.COMMAND, frictions_by_engine.rows(out))
+
+    return Illustration((file,), cases, make)
+
+
 def _validation() -> Illustration:
     """All comparisons of `studies.literature`, and a figure of its benchmarks."""
     figure_file = "figures/benchmarks.png"
@@ -545,6 +564,7 @@ for _shown in _SWEEP_FIGURES:
 ILLUSTRATIONS["pile-climbs"] = _climbs()
 ILLUSTRATIONS["unexplained"] = _effects()
 ILLUSTRATIONS["frictions"] = _frictions()
+ILLUSTRATIONS["frictions-by-engine"] = _frictions_by_engine()
 ILLUSTRATIONS["validation"] = _validation()
 ILLUSTRATIONS["others"] = _repeated_experiments()
 ILLUSTRATIONS["calibration"] = _calibration()
