@@ -1,6 +1,8 @@
 """The theory of dimers against the paper's numbers, closed forms, and the engine."""
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import inf, pi, radians, sin
@@ -171,6 +173,23 @@ def test_the_cache_of_numba_does_not_name_the_function_of_an_effect() -> None:
     effect_type = typeof(compiled_effect(drag_of_the_first_bead))
     assert isinstance(effect_type, FunctionType)
     assert "drag" not in str(effect_type)
+
+
+AGAIN = """
+from walkers import load_case
+from walkers.theory.motion import Walker, predict_motion
+from walkers.theory.stepping import integrate
+
+predict_motion(Walker.of_case(load_case("fig1b")), 80.0, 39.2, cycles=1)
+print(sum(integrate.stats.cache_misses.values()))
+"""
+"""A program that prints how often numba had to compile the integrator for a walker with edges."""
+
+
+def test_the_integrator_is_compiled_once_for_all_processes() -> None:
+    predict_motion(Walker.of_case(load_case("fig1b")), 80.0, 39.2, cycles=1)
+    done = subprocess.run([sys.executable, "-c", AGAIN], capture_output=True, text=True, check=True)
+    assert done.stdout == "0\n"
 
 
 @pytest.mark.slow

@@ -237,9 +237,8 @@ def predict_motion(  # noqa: PLR0913
     force_law = None
     parameters = np.zeros((count, 0))
     if effect is not None:
-        force_law, parameters = effect
-        if force_law is not edge_forces:
-            force_law = compiled_effect(force_law)
+        function, parameters = effect
+        force_law = compiled_effect(function)
     sliding, smallest_normal_force, periodic, solved, series = integrate(
         tables, friction, drive, force_law, parameters, cycles, steps_per_cycle
     )

@@ -175,13 +175,14 @@ def integrate(  # noqa: PLR0913, PLR0917
 
 @cache
 def compiled_effect(effect: Effect) -> Effect:
-    """Compile a force law from elsewhere so that `integrate` depends on its types alone.
+    """Compile a force law so that `integrate` depends on its types alone.
 
-    With the function itself, the compiled `integrate` in the cache of numba would name the module
-    of the function, and could not be loaded where that module is missing.
+    With the function itself, numba would compile `integrate` anew in each process; and its cache
+    would name the module of the function, and could not be loaded where that module is missing.
     """
     function = getattr(effect, "py_func", effect)  # of one that numba has compiled
-    compiled: Effect = cfunc(_OF_EFFECT)(function)
+    is_ours = effect is edge_forces
+    compiled: Effect = cfunc(_OF_EFFECT, cache=is_ours)(function)
     return compiled
 
 
