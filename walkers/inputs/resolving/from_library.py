@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import Any
 
 from walkers.errors import InputError, Problem, expected_of, key_error, quoted
-from walkers.inputs.config_table import alternatives, changed
+from walkers.inputs.config_table import alternatives, changed, whole_table_of
 from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.origins import Source
 from walkers.inputs.resolving.library import Composition, Library, LibraryNumber, unmeasured
@@ -100,7 +100,8 @@ def supplied(
     sources : dict of str to Source
         Sources of the values that were filled in, by their keys.
     problems : list of Problem
-        Names that the library does not know, and wrong compositions of the liquid.
+        Names that the library does not know, wrong compositions of the liquid, and missing keys of
+        a table in the place of a number of the library.
     """
     names = {key: _name_at(document, key) for key in NAMES}
     given = {key for key in SUPPLIED if value_at(document, parts_of(key)) is not MISSING}
@@ -125,6 +126,7 @@ def supplied(
     if composition and value_at(document, parts_of(_TEMPERATURE)) is MISSING:
         sources[_TEMPERATURE] = Source("default", text=_DEFAULT_TEMPERATURE)
     written: dict[str, Any] = {}
+    problems += _incomplete_tables(document, values)
     other_forms = _keys_of_other_forms(document, values)
     for key in SUPPLIED:
         if key in other_forms:
@@ -157,6 +159,27 @@ def _keys_of_other_forms(
         else:
             not_taken |= {f"{key}.{part}" for part in _LAW}
     return not_taken
+
+
+def _incomplete_tables(
+    document: Mapping[str, Any], values: Mapping[str, LibraryNumber]
+) -> list[Problem]:
+    """Missing keys of tables of friction where the library has a number.
+
+    ``values`` are as from `_values`.
+    """
+    problems = []
+    for key in _FRICTION:
+        written = value_at(document, parts_of(key))
+        if not isinstance(written, Mapping) or key not in values or f"{key}.rise" in values:
+            continue
+        number = values[key].written
+        message = f"missing; without the table, {key} is the number {number}: "
+        message += whole_table_of(CaseFile, key)
+        problems += [
+            Problem(f"{key}.{part}", None, message) for part in _LAW if part not in written
+        ]
+    return problems
 
 
 def _name_at(document: Mapping[str, Any], key: str) -> str | None:
