@@ -454,6 +454,21 @@ def test_a_library_without_the_velocity_of_a_rise_is_refused(own_case: Path) -> 
         load_case(own_case)
 
 
+def test_a_library_with_the_table_of_a_case_is_refused_in_one_sentence(own_case: Path) -> None:
+    library = own_case.parent / "library.toml"
+    lines = [line for line in LIBRARY.splitlines() if "rise" not in line]
+    text = "\n".join(lines).replace(
+        'friction = { value = 0.03, source = "a tribometer", range = [0.02, 0.05] }',
+        'friction = { at_rest = 0.03, rise = 0.5, half_rise_velocity = "80 mm/s" }',
+    )
+    library.write_text(text)
+    with pytest.raises(InputError) as error:
+        load_case(own_case)
+    (problem,) = error.value.problems
+    assert problem.key == "surface_pairs[0].friction"
+    assert "keys of their own beside it, friction_rise and half_rise_velocity" in problem.expected
+
+
 def test_the_roughness_of_materials_without_a_range_has_none(own_case: Path) -> None:
     assert origins(load_case(own_case))["contact.roughness.bead_bead"].range is None
 
