@@ -100,8 +100,8 @@ def supplied(
     sources : dict of str to Source
         Sources of the values that were filled in, by their keys.
     problems : list of Problem
-        Names that the library does not know, wrong compositions of the liquid, and missing keys of
-        a table in the place of a number of the library.
+        Names that the library does not know, wrong compositions of the liquid, and keys that are
+        missing because of what the library has instead.
     """
     names = {key: _name_at(document, key) for key in NAMES}
     given = {key for key in SUPPLIED if value_at(document, parts_of(key)) is not MISSING}
@@ -127,6 +127,10 @@ def supplied(
         sources[_TEMPERATURE] = Source("default", text=_DEFAULT_TEMPERATURE)
     written: dict[str, Any] = {}
     problems += _incomplete_tables(document, values)
+    if "liquid.edge_ratio" not in given and "liquid.edge_ratio" not in values:
+        problems += _edges_of_beads_alone(
+            library, names["beads.material"], names["boundary.material"]
+        )
     other_forms = _keys_of_other_forms(document, values)
     for key in SUPPLIED:
         if key in other_forms:
@@ -180,6 +184,21 @@ def _incomplete_tables(
             Problem(f"{key}.{part}", None, message) for part in _LAW if part not in written
         ]
     return problems
+
+
+def _edges_of_beads_alone(
+    library: Library, bead_material: str | None, boundary_material: str | None
+) -> list[Problem]:
+    """The problem of a factor for edges that two beads have, but beads and boundary do not."""
+    edge_ratio = library.surface_pair(bead_material, bead_material).get("edge_ratio")
+    if edge_ratio is None:
+        return []
+    message = (
+        f"missing; the library has {edge_ratio.written} for {bead_material} on {bead_material}, "
+        f"but one factor holds at all menisci, that of {bead_material} on {boundary_material}: "
+        "give edge_ratio there or here"
+    )
+    return [Problem("liquid.edge_ratio", None, message)]
 
 
 def _name_at(document: Mapping[str, Any], key: str) -> str | None:
