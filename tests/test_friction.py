@@ -22,7 +22,10 @@ from walkers.inputs.sweep import expand, load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import BOTTOM
 from walkers.physics.friction import SlidingFriction
+from walkers.postprocess.measure.uncertainty import uncertain_value_lines, uncertain_values
 from walkers.runner.binary import find_engine
+from walkers.runs.case_text import flattened
+from walkers.runs.listing import ListEntry, by_case
 from walkers.second_engine import scenes
 from walkers.second_engine.engine import SecondEngine
 from walkers.second_engine.lines import Verdict
@@ -537,3 +540,45 @@ def test_a_table_does_not_take_its_friction_at_rest_from_coulombs_law(
 def test_a_table_without_its_velocity_is_refused(case_by_coulomb: Path) -> None:
     with pytest.raises(InputError, match=r"bead_bead\.half_rise_velocity: missing"):
         load_case(case_by_coulomb, {BETWEEN_BEADS: {"at_rest": 0.1, "rise": 0.2}})
+
+
+# --- results and lists ----------------------------------------------------------------------------
+
+
+def test_a_list_of_runs_shows_a_number_and_a_growing_friction_in_one_column() -> None:
+    """Such as 0.1 + 0.4 v/(v + 20 mm/s)."""
+    runs = []
+    for name, friction in [("first", 0.25), ("second", table(LAW))]:
+        case = load_case("fig1b", {AT_WALL: friction})
+        entry = ListEntry(
+            kind="run",
+            name=name,
+            case="fig1b",
+            status="finished",
+            directory=Path(name),
+            parameters=flattened(case),
+        )
+        runs.append(entry)
+    (runs_of_case,) = by_case(runs)
+    head, first, second = runs_of_case.as_text().splitlines()
+    column = head.index("bead_wall")
+    assert first[column:].startswith("0.25 ")
+    assert second[column:].startswith("0.1 + 0.4 v/(v + 20 mm/s)")
+
+
+@pytest.mark.parametrize(("liquid", "head"), [("Si AK5", "assumed"), ("glycerol 87 %", "guessed")])
+def test_a_result_has_the_velocity_of_an_uncertain_rise(liquid: str, head: str) -> None:
+    """With a liquid other than that of the calibration, it is a guess as the rise is."""
+    case = load_case("fig1b", {"liquid.name": liquid})
+    lines = uncertain_value_lines(uncertain_values(case.origins))
+    words = " ".join(" ".join(lines).split())
+    before, _, _ = words.partition("friction.bead_bead.half_rise_velocity 1 m/s")
+    assert before != words
+    heads = [word for word in before.split() if word in {"guessed", "calibrated", "assumed"}]
+    assert heads[-1] == head
+
+
+def test_a_result_has_no_velocity_of_a_rise_without_a_range() -> None:
+    case = load_case("fig1b", WALKER)
+    keys = [value["key"] for value in uncertain_values(case.origins)]
+    assert f"{BETWEEN_BEADS}.half_rise_velocity" not in keys

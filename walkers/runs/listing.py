@@ -28,8 +28,8 @@ from walkers.runs.case_text import (
     differing,
     flattened,
     has_value,
-    readable,
     short_keys,
+    value_text,
 )
 from walkers.runs.making import progress_at
 from walkers.runs.status import state_at
@@ -364,7 +364,7 @@ class RunsOfCase:
             status = run.status
             if run.reason:
                 status = f"{run.status}: {run.reason}"
-            values = [readable(key, run.parameters.get(key)) for key in self.keys]
+            values = [value_text(run.parameters, key) for key in self.keys]
             lines.append([run.name, status, run.result, *run.age_and_size, *values])
         return aligned(lines)
 
