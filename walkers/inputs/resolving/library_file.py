@@ -5,7 +5,7 @@ Their models take time to build: only what reads such files imports this module.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from typing import Annotated, Any, Generic, TypeVar
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
@@ -102,9 +102,10 @@ class SurfacePairTable(ConfigTable):
     @classmethod
     def _is_no_table_of_a_case(cls, friction: object) -> object:
         """The friction; raises `ValueError` for the table that a case has."""
-        if isinstance(friction, Mapping) and not friction.keys().isdisjoint(
-            FrictionLaw.model_fields
-        ):
+        keys: Set[str] = set()
+        if isinstance(friction, Mapping):
+            keys = friction.keys()
+        if keys & FrictionLaw.model_fields.keys():
             raise ValueError(
                 'expected { value = ..., source = "..." } for the friction at rest; keys of their '
                 "own beside it, friction_rise and half_rise_velocity, have the other two numbers"
