@@ -8,7 +8,6 @@ subject of `walkers.inputs.resolving.steps`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -321,7 +320,7 @@ def _source_of(key: str, number: LibraryNumber, liquid: str | None) -> Source:
     """
     default = unmeasured().get(key)
     if key in _WITHOUT_USUAL_VALUES:
-        default = replace(number, calibrated_with=())
+        default = number  # there is no usual value: a guess keeps the range of the library
     measured = bool(number.source) and not number.calibrated_with
     ends = number.range
     if default is None or measured:
