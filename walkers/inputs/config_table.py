@@ -495,7 +495,7 @@ def changed(
         stands in its place.
     """
     tables = copy.deepcopy(dict(document))
-    parts_last = sorted(changes, key=lambda name: any(is_below(name, other) for other in changes))
+    parts_last = sorted(changes, key=lambda name: any(is_below(name, whole) for whole in changes))
     for name in parts_last:
         value = changes[name]
         _make_table_of_number(model, tables, name, changes)

@@ -42,7 +42,7 @@ def joined(parts: Sequence[str | int]) -> str:
     return key.removeprefix(".")
 
 
-def is_below(key: str, other: str) -> bool:
+def is_below(key: str, whole_key: str) -> bool:
     """Whether a dotted key is a part of the value of another one.
 
     Examples
@@ -50,7 +50,7 @@ def is_below(key: str, other: str) -> bool:
     >>> is_below("drive.harmonics[1].phase", "drive.harmonics")
     True
     """
-    return key.startswith((f"{other}.", f"{other}["))
+    return key.startswith((f"{whole_key}.", f"{whole_key}["))
 
 
 def value_at(document: Any, parts: Sequence[str | int]) -> Any:

@@ -197,8 +197,8 @@ def _mode_of_meshing_spins(dimer: Dimer, modes: npt.NDArray[np.complex128]) -> i
     """
     masses = np.array(dimer.masses)
     inertias = 0.4 * masses * np.array(dimer.radii) ** 2
-    # Scaled by these roots, the square of a mode is twice its kinetic energy. The first variable, ψ,
-    # has none.
+    # Scaled by these roots, the square of a mode is twice its kinetic energy. The first variable,
+    # ψ, has none.
     root_of_energy = np.sqrt(np.concatenate([masses, inertias, inertias]))
     moving = root_of_energy[:, None] * modes[1:]
     first, second = dimer.radii
