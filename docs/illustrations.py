@@ -28,7 +28,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from docs import tables
+from docs import tables, why_it_walks
 from studies import effects, frictions, frictions_by_engine
 from studies.friction_laws import LAWS, calibration_with
 from studies.literature import experiments
@@ -70,6 +70,9 @@ RECORD = Path("figures") / "made-from.json"
 
 CHECKED = Path("figures") / "validation.json"
 """Lines of ``python -m studies.literature``, of which pages quote numbers, in docs/."""
+
+_NUMBERS_OF_A_CYCLE = Path("figures") / "why-it-walks.json"
+"""Numbers of `docs.why_it_walks`, in docs/."""
 
 _BLOCK = re.compile(
     r"(?ms)(?P<head><!--output-->\n```console\n\$ (?P<command>walkers [^\n]+)\n).*?(?=^```)"
@@ -364,6 +367,23 @@ def _effects() -> Illustration:
     return Illustration((file,), cases, make)
 
 
+def _why_it_walks() -> Illustration:
+    """The figure and the numbers of the page *Why it walks*."""
+    figure = "figures/why-it-walks.png"
+
+    def cases() -> list[Case]:
+        shown = why_it_walks.shown_case()
+        braked_less = (why_it_walks.WITHOUT_FRICTION, why_it_walks.WITHOUT_VISCOSITY)
+        return [shown] + [load_case(why_it_walks.SHOWN, changes) for changes in braked_less]
+
+    def make(out: Path, docs: Path) -> None:
+        shown = run(why_it_walks.SHOWN, out)
+        save_figure(why_it_walks.figure(shown), docs / figure, [shown.directory.name])
+        write_json(docs / _NUMBERS_OF_A_CYCLE, why_it_walks.numbers(out))
+
+    return Illustration((figure, str(_NUMBERS_OF_A_CYCLE)), cases, make)
+
+
 def _frictions() -> Illustration:
     """The table of `studies.frictions`, which takes half an hour."""
     file = "figures/frictions.md"
@@ -563,6 +583,7 @@ for _shown in _SWEEP_FIGURES:
     ILLUSTRATIONS[_shown.name] = _sweep(_shown)
 ILLUSTRATIONS["pile-climbs"] = _climbs()
 ILLUSTRATIONS["unexplained"] = _effects()
+ILLUSTRATIONS["why-it-walks"] = _why_it_walks()
 ILLUSTRATIONS["frictions"] = _frictions()
 ILLUSTRATIONS["frictions-by-engine"] = _frictions_by_engine()
 ILLUSTRATIONS["validation"] = _validation()
@@ -689,12 +710,14 @@ def facts(docs: Path) -> dict[str, str]:
     Returns
     -------
     dict
-        Texts by name: of the comparison with the paper, of the calibration, of `CHECKED`, and of
-        the cells of tables.
+        Texts by name: of the comparison with the paper, of the calibration, of `CHECKED`, of a
+        cycle of a walker, and of the cells of tables.
     """
     numbers = _of_comparison(read_json(docs / "figures" / "comparison.json"))
     numbers |= tables.calibration_numbers(read_json(docs / "figures" / "calibration.json"))
     numbers |= _of_checks(read_json(docs / CHECKED)["lines"])
+    for name, value in read_json(docs / _NUMBERS_OF_A_CYCLE).items():
+        numbers[f"why_{name}"] = f"{value:.2g}"
     numbers |= dict(tables.cell_texts(docs / "figures"))
     return numbers
 

@@ -36,7 +36,13 @@ from walkers.theory.mathieu import (
 from walkers.theory.motion import PredictedMotion, Walker, predict_motion
 from walkers.theory.prediction import alignment_of, motion_of, predict, threshold
 from walkers.theory.prediction_text import prediction_text
-from walkers.theory.quasistatic import CONTACTS, detachment, mass_asymmetry, mean_velocity
+from walkers.theory.quasistatic import (
+    CONTACTS,
+    detachment,
+    mass_asymmetry,
+    mean_velocity,
+    normal_force_matrix,
+)
 from walkers.theory.stepping import compiled_effect
 
 
@@ -658,3 +664,17 @@ def test_the_text_says_that_symmetric_dimers_turn_across_it() -> None:
     text = prediction_text(predict(load_case("symmetric")), None)
     assert "no torque toward the axis if the beads roll" in text
     assert "turns away from the axis, from 1° to 10° in about" in text
+
+
+def test_the_load_between_rolling_beads_falls_forward_by_masses_and_tilt():
+    """Equal forces T at both feet and at the contact change its load by T (mu + sin d)/cos d."""
+    sin_delta = 0.2
+    rolls_forward = np.array([1.0, 1.0, -1.0])
+
+    change = normal_force_matrix(sin_delta)[2] @ rolls_forward
+
+    by_masses = mass_asymmetry(sin_delta) / np.sqrt(1.0 - sin_delta**2)
+    by_tilt = sin_delta / np.sqrt(1.0 - sin_delta**2)
+    assert change == pytest.approx(-(by_masses + by_tilt))
+    assert by_masses == pytest.approx(0.554, abs=0.001)
+    assert by_tilt == pytest.approx(0.204, abs=0.001)

@@ -158,7 +158,7 @@ def turning_rate(case: Case) -> float | None:
     along the axis, resist their sideways velocity by E/|u|^(1/3) (`walkers.physics.edges`).
     """
     walker = Walker.of_case(case)
-    axial = _axial_motion(case, walker)
+    axial = axial_motion(case, walker)
     if axial is None:
         return None
     frequency = case.excitation.frequency
@@ -210,7 +210,7 @@ def _mode_of_meshing_spins(dimer: Dimer, modes: npt.NDArray[np.complex128]) -> i
 
 
 @dataclass(frozen=True)
-class _AxialMotion:
+class AxialMotion:
     """The periodic motion along the axis, and the forces that go with it.
 
     Values are those in the middle of each step of a cycle.
@@ -233,7 +233,7 @@ class _AxialMotion:
     """Resistances E of the edges of the three bridges, N (s/m)^(2/3), shape (3,)."""
 
 
-def _axial_motion(case: Case, walker: Walker) -> _AxialMotion | None:
+def axial_motion(case: Case, walker: Walker) -> AxialMotion | None:
     """The axial motion of the dimer of a case; None if it is not periodic."""
     dimer = dimer_of(case)
     frequency = case.excitation.frequency
@@ -273,7 +273,7 @@ def _axial_motion(case: Case, walker: Walker) -> _AxialMotion | None:
     # lowest point, which makes the bead roll forward; its couples act on -ω, hence with a plus on
     # ω. The torque of the other bead is the rest of I dω/dt, with I = 0.4 m R² of a solid sphere.
     total_torque = 0.4 * masses * radii * (acceleration - slope[:2])
-    return _AxialMotion(
+    return AxialMotion(
         sliding=sliding,
         normal=np.maximum(normal, 0.0),  # an open contact has no load
         spin=(translation(sliding) - sliding[:2]) / radii,
@@ -311,7 +311,7 @@ def _slowing(velocity: FloatArray) -> FloatArray:
     return slowing
 
 
-def _resistance_to_rolling(case: Case, axial: _AxialMotion) -> FloatArray:
+def _resistance_to_rolling(case: Case, axial: AxialMotion) -> FloatArray:
     """Resistance of rolling friction to sideways rolling, N m s, shape (3, steps).
 
     It is that at the mean sideways speed of the beads at `_ANGLE`.
@@ -333,7 +333,7 @@ def _resistance_to_rolling(case: Case, axial: _AxialMotion) -> FloatArray:
 def _sideways_slopes(
     dimer: Dimer,
     resistances: FloatArray,
-    axial: _AxialMotion,
+    axial: AxialMotion,
     sliding_resistance: FloatArray,
     rolling_resistance: FloatArray,
 ) -> FloatArray:
@@ -408,7 +408,7 @@ def _sideways_slopes(
     return slopes
 
 
-def _sideways_edges(dimer: Dimer, axial: _AxialMotion) -> tuple[FloatArray, FloatArray]:
+def _sideways_edges(dimer: Dimer, axial: AxialMotion) -> tuple[FloatArray, FloatArray]:
     """The forces and couples of edges that move across the dimer, as in `_sideways_slopes`.
 
     The point of contact moves along the surfaces with the velocities of
