@@ -261,6 +261,31 @@ def test_a_fast_rise_shortens_the_time_step() -> None:
     assert case.run.time_step <= 0.4 * limits_of(case).friction
 
 
+@pytest.mark.parametrize("large", [0.2e-3, 0.3e-3], ids=["equal radii", "unequal radii"])
+def test_a_fast_rise_between_beads_shortens_the_time_step(large: float) -> None:
+    """20/(7/2 μ'N (1/m₁ + 1/m₂)) with μ' = 0.3/30 µm/s between the beads, 4πγR* + m₁ a of load.
+
+    A little liquid between surfaces that touch pulls with 4πγR*, γ = 19.2 mN/m. The limit is that
+    of the large bead, whose weight m₁ a at 1 + 4 g is larger.
+    """
+    fast = {"at_rest": 0.1, "rise": 0.3, "half_rise_velocity": "0.03 mm/s"}
+    changes = {
+        "dimers.radii": [f"{large!r} m", "0.2 mm"],
+        BETWEEN_BEADS: fast,
+        AT_WALL: 0.2,
+        "liquid.law": "rabinovich",
+        "liquid.volume_fraction": 1e-8,
+    }
+    case = load_case("fig1b", changes)
+    small = 0.2e-3
+    large_mass = 4000.0 * 4.0 / 3.0 * np.pi * large**3
+    small_mass = 4000.0 * 4.0 / 3.0 * np.pi * small**3
+    pull = 4.0 * np.pi * 0.0192 * large * small / (large + small)
+    load = pull + large_mass * (9.81 + 4.0 * 9.8)
+    expected = 20.0 / (3.5 * 1e4 * load * (1.0 / large_mass + 1.0 / small_mass))
+    assert limits_of(case).friction == pytest.approx(expected, rel=1e-4)
+
+
 def test_without_a_rise_friction_limits_no_time_step() -> None:
     assert limits_of(load_case("fig1b", COULOMB)).friction == np.inf
 
