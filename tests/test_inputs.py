@@ -178,8 +178,10 @@ def test_no_value_of_the_calibrated_case_is_guessed() -> None:
 
 
 def test_what_was_calibrated_with_a_silicone_oil_holds_for_another_one() -> None:
-    menisci = origins(load_case("fig1b", {"liquid.name": "Si AK10"}))["liquid.meniscus_radius"]
-    assert menisci.origin == "calibrated"
+    by_key = origins(load_case("fig1b", {"liquid.name": "Si AK10"}))
+    assert by_key["liquid.meniscus_radius"].origin == "calibrated"
+    assert by_key["liquid.edge_ratio"].origin == "calibrated"
+    assert not by_key["liquid.edge_ratio"].guessed
 
 
 def test_what_was_calibrated_with_silicone_oil_is_a_guess_for_glycerol() -> None:
@@ -189,6 +191,15 @@ def test_what_was_calibrated_with_silicone_oil_is_a_guess_for_glycerol() -> None
     assert menisci.text == "70 um"
     assert menisci.guessed
     assert menisci.range == unmeasured()["liquid.meniscus_radius"].range
+
+
+def test_a_factor_for_edges_that_was_calibrated_with_silicone_oil_is_a_guess_for_glycerol() -> None:
+    """No factor is usual: the guess has the number and the range of the calibration."""
+    edges = origins(load_case("fig1b", {"liquid.name": "glycerol 87 %"}))["liquid.edge_ratio"]
+    assert edges.origin == "default"
+    assert edges.text == "1.5"
+    assert edges.guessed
+    assert edges.range == (0.91, 2.9)
 
 
 def test_what_was_calibrated_with_a_bridge_law_is_a_guess_for_another_one() -> None:
