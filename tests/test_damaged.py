@@ -12,6 +12,8 @@ import signal
 import socket
 import struct
 import subprocess
+import sys
+import tempfile
 import tracemalloc
 import zipfile
 from collections.abc import Callable, Iterator
@@ -508,6 +510,66 @@ def test_a_motion_that_no_disk_can_hold_says_how_much_it_needs(tmp_path: Path) -
     """240 TB: more than a file may have."""
     with pytest.raises(DumpError, match=r"needs 2\.4e\+05 GB on its disk"):
         large_arrays.empty_array((100_000, 100_000_000, 3), tmp_path)
+
+
+LIMITED = """
+import resource
+import signal
+import sys
+from pathlib import Path
+
+from walkers.postprocess.measure import large_arrays
+from walkers.postprocess.measure.dump import DumpError
+
+large_arrays.LARGEST_IN_MEMORY = 0
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+limit = int(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+try:
+    print(large_arrays.empty_array((1000, 3), Path(sys.argv[1])).shape)
+except DumpError as error:
+    print(error)
+"""
+"""A program that makes an array of 24,000 bytes in a folder where files have a largest size."""
+
+
+@pytest.mark.parametrize(
+    ("limit", "expected"),
+    [
+        pytest.param(4_000, r"needs 2\.4e-05 GB on its disk .*\(File too large\)", id="a sixth"),
+        pytest.param(
+            23_999, r"needs 2\.4e-05 GB on its disk .*\(File too large\)", id="a byte less"
+        ),
+        pytest.param(24_000, r"^\(1000, 3\)$", id="all of it"),
+    ],
+)
+def test_an_array_on_the_disk_takes_all_of_its_space_at_once(
+    limit: int, expected: str, tmp_path: Path
+) -> None:
+    """Of each number all 8 bytes, not one."""
+    command = [sys.executable, "-c", LIMITED, str(tmp_path), str(limit)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert re.search(expected, done.stdout.strip())
+
+
+@pytest.fixture
+def read_only(tmp_path: Path) -> Iterator[Path]:
+    """A folder in which nobody can write, not even root."""
+    with mounted(tmp_path / "archive", "256k") as place:
+        subprocess.run(["mount", "-o", "remount,ro", str(place)], check=True)
+        yield place
+
+
+def test_an_array_of_a_read_only_run_is_in_the_folder_for_temporary_files(
+    read_only: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(large_arrays, "LARGEST_IN_MEMORY", 0)
+    array = large_arrays.empty_array((1000, 3), read_only)
+    array[:] = 7.0
+    assert array.sum() == 21_000.0
+    place = re.escape(tempfile.gettempdir())
+    with pytest.raises(DumpError, match=rf"^{place}: the motion .* needs 2\.4e\+05 GB"):
+        large_arrays.empty_array((100_000, 100_000_000, 3), read_only)
 
 
 @dataclass(frozen=True)
