@@ -20,6 +20,7 @@ from walkers.inputs.reading import find_input, load_case, read_case
 from walkers.inputs.resolving.loads import contact_loads, surfaces_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import BOTTOM
+from walkers.physics.dimer import Dimer
 from walkers.physics.edges import edge_resistance, wetted_radius
 from walkers.runner.binary import find_engine
 from walkers.second_engine.scenes import (
@@ -36,7 +37,8 @@ from walkers.second_engine.scenes import (
 )
 from walkers.templates.bridge_tables import RecordedLaw
 from walkers.templates.deck import BRIDGES_NAME, render_deck
-from walkers.theory.mathieu import turning_rate
+from walkers.templates.placement import Bead
+from walkers.theory.mathieu import _AxialMotion, _sideways_edges, turning_rate
 from walkers.theory.motion import Walker, predict_motion
 
 MASS = 4000.0 * 4.0 / 3.0 * pi * LARGE_RADIUS**3
@@ -160,6 +162,103 @@ def test_edges_between_beads_conserve_momentum_and_angular_momentum(tmp_path: Pa
     total_torque = (torques + np.cross(places, forces)).sum(axis=0)
     assert np.abs(forces.sum(axis=0)).max() < 1e-12 * np.abs(forces).max()
     assert np.abs(total_torque).max() < 1e-9 * np.abs(torques).max()
+
+
+@pytest.fixture(
+    params=[
+        pytest.param((0.3e-3, 0.2e-3), id="the first bead is larger"),
+        pytest.param((0.2e-3, 0.3e-3), id="the second bead is larger"),
+    ]
+)
+def dimer(request: pytest.FixtureRequest) -> Dimer:
+    """Two beads of 4 g/cm³ with Si AK5."""
+    return Dimer(request.param, 4000.0, 0.0192)
+
+
+ACROSS = np.array([2e-3, 4e-5, -3e-5, 0.11, -0.23, 0.31, 0.17])
+"""Small ψ (rad), velocities of both beads across the drive (m/s), and their spins about the drive
+and about the vertical (rad/s): the variables of `walkers.theory.mathieu`."""
+AXIAL_SPINS = (150.0, -220.0)
+"""Spins of both beads across the drive, rad/s."""
+AXIAL_VELOCITY = 0.05
+"""Velocity of both beads along the drive, m/s."""
+OVERLAP = 1e-9
+"""Overlap of surfaces, m: they touch, and hardly repel each other."""
+
+
+def moving_bead(number: int, radius: float, centre: FloatArray) -> Bead:
+    """A bead of a dimer, with the velocity and the spin that it has by `ACROSS`."""
+    velocity = (AXIAL_VELOCITY, float(ACROSS[1 + number]), 0.0)
+    spin = (float(ACROSS[3 + number]), AXIAL_SPINS[number], float(ACROSS[5 + number]))
+    x, y, z = centre.tolist()
+    return Bead(0, (x, y, z), radius, velocity, spin)
+
+
+def beads_of(dimer: Dimer) -> list[Bead]:
+    """The two beads as they touch each other, far from walls, and again apart on the floor."""
+    touching = []
+    on_floor = []
+    sine = dimer.sin_delta
+    cosine = (1.0 - sine**2) ** 0.5
+    axis = np.array([cosine * np.cos(ACROSS[0]), cosine * np.sin(ACROSS[0]), sine])
+    distance = sum(dimer.radii) - OVERLAP
+    for number, radius in enumerate(dimer.radii):
+        middle = np.array([0.0, 0.0, 5e-3])
+        place = (0.5 - number) * distance * axis
+        touching.append(moving_bead(number, radius, middle + place))
+        beside = np.array([3e-3 * number, 3e-3, BOTTOM.point[2] + radius - OVERLAP])
+        on_floor.append(moving_bead(number, radius, beside))
+    return touching + on_floor
+
+
+def axial_motion(case: Case, dimer: Dimer) -> _AxialMotion:
+    """The motion along the drive that goes with `beads_of`, of one step."""
+    first, second = dimer.radii
+    contacts = [(first, np.inf), (second, np.inf), (first, second)]
+    edges = [edge_resistance(surfaces_of(case, *radii)) for radii in contacts]
+    return _AxialMotion(
+        sliding=np.zeros((3, 1)),
+        normal=np.zeros((3, 1)),
+        spin=np.array(AXIAL_SPINS)[:, None],
+        force=np.zeros(1),
+        torque=np.zeros((2, 1)),
+        velocity=np.array([AXIAL_VELOCITY]),
+        edges=np.array(edges),
+    )
+
+
+def test_edges_that_move_across_the_drive_resist_in_the_theory_as_in_the_engine(
+    dimer: Dimer, tmp_path: Path
+) -> None:
+    """Forces F and couples M at the three contacts, in a direction c across the walker.
+
+    With the unit vector n toward a bead, its torque is -R n × F - n × M, so that M is the part of
+    -torque along n × c, without R F. The velocities across are a thousandth of those along the
+    drive: the theory, which is linear in them, leaves out the square.
+    """
+    case = case_of_edges(**{"environment.gravity": "0 m/s^2"})
+    output = Bench(find_engine(), tmp_path).run(prescribed(case, scene_of(beads_of(dimer)), 1))
+    axis = output.frames[1, 0, :3] - output.frames[1, 1, :3]
+    axis /= np.linalg.norm(axis)
+    across_walker = np.array([-axis[1], axis[0], 0.0]) / np.hypot(axis[0], axis[1])
+    across_drive = np.array([0.0, 1.0, 0.0])
+    upward = np.array([0.0, 0.0, 1.0])
+    contacts = [  # number of the bead in the scene, its radius, n and c
+        (2, dimer.radii[0], upward, across_drive),
+        (3, dimer.radii[1], upward, across_drive),
+        (0, dimer.radii[0], axis, across_walker),
+    ]
+    engine_forces = []
+    engine_couples = []
+    for bead, radius, normal, across in contacts:
+        force = output.forces[1, bead, :3] @ across
+        torque = output.forces[1, bead, 3:] @ np.cross(normal, across)
+        engine_forces.append(force)
+        engine_couples.append(-torque - radius * force)
+
+    forces, couples = _sideways_edges(dimer, axial_motion(case, dimer))
+    assert forces[:, 0] @ ACROSS == pytest.approx(engine_forces, rel=1e-4)
+    assert couples[:, 0] @ ACROSS == pytest.approx(engine_couples, rel=1e-4)
 
 
 # --- walkers --------------------------------------------------------------------------------------
