@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Callable
+from dataclasses import dataclass
 from math import pi
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,7 @@ from walkers.inputs.reading import find_input, load_case, read_case
 from walkers.inputs.resolving.loads import contact_loads, surfaces_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import BOTTOM
+from walkers.physics.capillary import BridgeLiquid
 from walkers.physics.dimer import Dimer
 from walkers.physics.edges import edge_resistance, wetted_radius
 from walkers.runner.binary import find_engine
@@ -31,11 +34,12 @@ from walkers.second_engine.scenes import (
     Bench,
     bead_at_plane,
     bench_case,
+    dry,
     pair,
     prescribed,
     scene_of,
 )
-from walkers.templates.bridge_tables import RecordedLaw
+from walkers.templates.bridge_tables import RecordedLaw, bridge_tables
 from walkers.templates.deck import BRIDGES_NAME, render_deck
 from walkers.templates.placement import Bead
 from walkers.theory.mathieu import _AxialMotion, _sideways_edges, turning_rate
@@ -259,6 +263,81 @@ def test_edges_that_move_across_the_drive_resist_in_the_theory_as_in_the_engine(
     forces, couples = _sideways_edges(dimer, axial_motion(case, dimer))
     assert forces[:, 0] @ ACROSS == pytest.approx(engine_forces, rel=1e-4)
     assert couples[:, 0] @ ACROSS == pytest.approx(engine_couples, rel=1e-4)
+
+
+# --- conserved liquid -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class BridgeOfVolume:
+    """A table of the engine's file: radii (m), volume (m³) and edge resistance, N (s/m)^(2/3)."""
+
+    radius: float
+    other_radius: float
+    volume: float
+    resistance: float
+
+
+def bridges_with_liquid(volume_fraction: float) -> list[BridgeOfVolume]:
+    """The tables of a bead of 0.2 mm at a wall, at its like and at one of 0.3 mm, and of that one.
+
+    The liquid is Si AK5 with an edge ratio of 1.5, and it is conserved.
+    """
+    case = bench_case(DRY)
+    liquid = BridgeLiquid(
+        surface_tension=0.0192,
+        viscosity=0.0046,
+        contact_angle=0.0,
+        volume_fraction=volume_fraction,
+        conserved=True,
+        edge_ratio=1.5,
+    )
+    text = bridge_tables([(case.contact, liquid)], {(1, 0.2e-3), (1, 0.3e-3)}, dry)
+    head = r"^bridge \d+ \d+ (\S+) (\S+)\nliquid (\S+) .*\nedge (\S+)$"
+    bridges = []
+    for numbers in re.findall(head, text, re.MULTILINE):
+        radius, other_radius, volume, resistance = map(float, numbers)
+        bridges.append(BridgeOfVolume(radius, other_radius, volume, resistance))
+    assert len(bridges) == text.count("bridge ")
+    return bridges
+
+
+def resistance_by_hand(bridge: BridgeOfVolume) -> float:
+    """1.5 · 7.905 γ r_w (η/γ)^(2/3), with r_w = (4 R* V/π)^(1/4) or 0.8 of the smaller radius."""
+    reduced_radius = 1.0 / (1.0 / bridge.radius + 1.0 / bridge.other_radius)
+    wetted = (4.0 * reduced_radius * bridge.volume / pi) ** 0.25
+    wetted = min(wetted, 0.8 * bridge.radius)
+    return 1.5 * 7.905 * 0.0192 * wetted * (0.0046 / 0.0192) ** (2.0 / 3.0)
+
+
+@pytest.mark.parametrize("volume_fraction", [0.01, 0.3], ids=["little liquid", "much liquid"])
+def test_edges_of_conserved_liquid_resist_as_those_of_the_volume(volume_fraction: float) -> None:
+    bridges = bridges_with_liquid(volume_fraction)
+    assert len(bridges) == 5 * 10
+    resistances = [bridge.resistance for bridge in bridges]
+    by_hand = [resistance_by_hand(bridge) for bridge in bridges]
+    assert resistances == pytest.approx(by_hand, rel=1e-3)
+
+
+def test_sixteen_times_the_conserved_liquid_doubles_the_resistance_of_edges() -> None:
+    """E is proportional to r_w = (4 R* V/π)^(1/4), hence to V^(1/4): by a step of √2, 2^(1/8)."""
+    at_wall = bridges_with_liquid(0.01)[:10]
+    assert at_wall[8].volume == pytest.approx(16.0 * at_wall[0].volume)
+    assert at_wall[8].resistance == pytest.approx(2.0 * at_wall[0].resistance)
+    resistances = np.array([bridge.resistance for bridge in at_wall])
+    assert resistances[1:] / resistances[:-1] == pytest.approx(2.0**0.125)
+
+
+def test_edges_that_the_bead_limits_do_not_grow_with_the_conserved_liquid() -> None:
+    """At a wall r_w = (8/3 φ)^(1/4) R with φ = 0.3: it is limited from 0.51 of the volume on.
+
+    0.8⁴ = 0.41 of 8/3 · 0.3 = 0.8. Of the volumes in steps of √2, the last three are larger.
+    """
+    at_wall = bridges_with_liquid(0.3)[:10]
+    last = at_wall[-1].resistance
+    assert at_wall[-3].resistance == last
+    assert at_wall[-2].resistance == last
+    assert at_wall[-4].resistance == pytest.approx((0.4 / 0.4096) ** 0.25 * last)
 
 
 # --- walkers --------------------------------------------------------------------------------------
