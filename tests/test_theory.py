@@ -666,7 +666,7 @@ def test_the_text_says_that_symmetric_dimers_turn_across_it() -> None:
     assert "turns away from the axis, from 1° to 10° in about" in text
 
 
-def test_the_load_between_rolling_beads_falls_forward_by_masses_and_tilt():
+def test_the_load_between_rolling_beads_falls_forward_by_masses_and_tilt() -> None:
     """Equal forces T at both feet and at the contact change its load by T (mu + sin d)/cos d."""
     sin_delta = 0.2
     rolls_forward = np.array([1.0, 1.0, -1.0])
