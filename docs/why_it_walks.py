@@ -76,20 +76,20 @@ def numbers(out: Path) -> dict[str, float]:
     """
     case = shown_case()
     motion = cycle()
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     moments = {"ahead": int(np.argmax(motion.velocity)), "back": int(np.argmin(motion.velocity))}
     for direction, step in moments.items():
         sliding = float(motion.sliding[2, step])
         coefficient = case.contact.friction.between_beads.coefficient(abs(sliding))
         load = float(motion.normal[2, step])
-        found[f"{direction}_speed"] = 1e3 * abs(float(motion.velocity[step]))
-        found[f"{direction}_sliding_speed"] = 1e3 * abs(sliding)
-        found[f"{direction}_load"] = 1e6 * load
-        found[f"{direction}_friction"] = 1e6 * float(coefficient) * load
-    found["mean_velocity"] = 1e3 * float(motion.velocity.mean())
+        values[f"{direction}_speed"] = 1e3 * abs(float(motion.velocity[step]))
+        values[f"{direction}_sliding_speed"] = 1e3 * abs(sliding)
+        values[f"{direction}_load"] = 1e6 * load
+        values[f"{direction}_friction"] = 1e6 * float(coefficient) * load
+    values["mean_velocity"] = 1e3 * float(motion.velocity.mean())
     for name, changes in (("frictionless", WITHOUT_FRICTION), ("inviscid", WITHOUT_VISCOSITY)):
-        found[name] = 1e3 * float(walk(load_case(SHOWN, changes), out).result["velocity"])
-    return found
+        values[name] = 1e3 * float(walk(load_case(SHOWN, changes), out).result["velocity"])
+    return values
 
 
 @styled
