@@ -55,6 +55,7 @@ from walkers.runs.names import (
 )
 from walkers.runs.status import state_at, worst_status
 from walkers.sweeps.accuracy import measure_accuracy
+from walkers.sweeps.against_first import compare_points
 from walkers.sweeps.climbing import conditions_in, summarise_climbs
 from walkers.sweeps.climbing_output import write_climbs
 from walkers.sweeps.figure import column_of, figure_of
@@ -63,7 +64,7 @@ from walkers.sweeps.record import SweepRecord, read_sweep_record
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import SweepOptions, run_sweep
 from walkers.sweeps.site import load_site
-from walkers.sweeps.spread import Spread, figures_of_spread, run_spread
+from walkers.sweeps.spread import Spread, draws_of, figures_of_spread, run_spread
 from walkers.sweeps.table import SweepTable, aligned_table, describe_status, table_of
 from walkers.sweeps.workers import Failure
 
@@ -1072,12 +1073,17 @@ def compare(
     out: str | Path = DEFAULT_OUT,
     changes: Mapping[str, Any] | None = None,
 ) -> Comparison:
-    """Compare two runs or cases in parameters and results.
+    """Compare two runs or cases in parameters and results, or the points of a sweep.
+
+    If both cases have a spread, or the points of the sweep, this gives the bands of the difference
+    and of the ratio of the main number, for common and for independent unknowns
+    (`walkers.runs.draws`).
 
     Parameters
     ----------
     first, second
-        Runs or cases, named as for `load`. The second one is the first by default.
+        Runs or cases, named as for `load`. The second one is the first by default. A sweep by
+        itself: its points are compared with its first one.
     out
         Folder of the run directories.
     changes
@@ -1091,9 +1097,13 @@ def compare(
     Raises
     ------
     InputError
-        If neither a second run nor changes are given, or a case cannot be read.
+        If neither a second run nor changes are given, a case cannot be read, or the points of a
+        sweep have no spread.
     """
     if second is None and not changes:
+        named = find(first, out)
+        if named.kind == "sweep":
+            return compare_points(Sweep(named.path)._table)
         raise input_error(first, "expected a second run, or changed values (--set KEY=VALUE)")
     references = [
         find(first, out),
@@ -1109,7 +1119,8 @@ def _side(named: Reference) -> ComparedRun:
     is_run = named.kind == "run" and not named.means_case
     name = directory.name if directory and is_run else str(named.given)
     changes = [f"{key}={value}" for key, value in named.changes.items()]
-    return ComparedRun(" ".join([name, *changes]), case, directory)
+    draws = draws_of(directory) if directory else None
+    return ComparedRun(" ".join([name, *changes]), case, directory, draws)
 
 
 def climb(

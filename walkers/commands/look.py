@@ -163,14 +163,15 @@ def report(
 
 
 def compare(
-    first: RunArgument,
+    first: RunOrSweepArgument,
     second: Annotated[str | None, Parameter(name="RUN")] = None,
     /,
     *,
     lookup: LookupOptions = LookupOptions(),
     as_json: JsonOption = False,
 ) -> None:
-    """Compare two runs or cases in parameters and results; --set changes the second case.
+    """Compare two runs or cases in parameters and results, or the points of a sweep with its first;
+    --set changes the second case.
 
     Parameters
     ----------

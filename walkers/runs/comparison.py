@@ -35,6 +35,8 @@ from walkers.postprocess.measure.results import Results, json_numbers, not_compu
 from walkers.rounding import counted, rounded
 from walkers.runner.manifest import read_manifest
 from walkers.runs.case_text import differing, flattened, readable
+from walkers.runs.draws import ComparedDraws, Draws, compare_draws
+from walkers.runs.draws_text import compared_draws_text
 from walkers.templates.deck import bridge_tables_digest
 from walkers.text import aligned, with_unit
 
@@ -66,11 +68,14 @@ class ComparedRun:
         Its case.
     directory
         The directory of its finished run; None if there is none.
+    draws
+        The draws of the spread of the run; None if it has no spread.
     """
 
     name: str
     case: Case
     directory: Path | None
+    draws: Draws | None = None
 
 
 @dataclass(frozen=True)
@@ -100,10 +105,11 @@ class _Parameter:
 
 @dataclass(frozen=True)
 class _FinishedRun:
-    """The name of a side, and the results of its run."""
+    """The name of a side, the results of its run, and the draws of its spread if it has one."""
 
     name: str
     results: Results
+    draws: Draws | None
 
 
 @dataclass(frozen=True)
@@ -138,13 +144,15 @@ def compare_runs(first: ComparedRun, second: ComparedRun) -> Comparison:
     parameters_text = _parameters_text(parameters, [first.name, second.name])
     results_text: list[str] = []
     numbers: list[_ComparedNumber] = []
+    draws: ComparedDraws | None = None
     if first.directory and second.directory:
         runs = (
-            _FinishedRun(first.name, read_results(first.directory)),
-            _FinishedRun(second.name, read_results(second.directory)),
+            _FinishedRun(first.name, read_results(first.directory), first.draws),
+            _FinishedRun(second.name, read_results(second.directory), second.draws),
         )
         numbers = _compared_numbers(runs[0].results, runs[1].results)
-        results_text = _results_text(numbers, runs)
+        draws = _compared_draws(numbers, runs)
+        results_text = _results_text(numbers, runs, draws)
         if not parameters:
             parameters_text += _cycles_text(numbers, runs)
     paragraphs = [parameters_text, *results_text]
@@ -162,6 +170,7 @@ def compare_runs(first: ComparedRun, second: ComparedRun) -> Comparison:
         "sources": {parameter.key: parameter.origin_words for parameter in parameters},
         "not_run": not_run,
         "results": [json_numbers(asdict(number)) for number in numbers],
+        "draws": asdict(draws) if draws else None,
     }
     return Comparison(contents, "\n\n".join(paragraphs))
 
@@ -270,6 +279,25 @@ def _compared_number(name: str, unit: str, first: Results, second: Results) -> _
     )
 
 
+def _compared_draws(
+    numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]
+) -> ComparedDraws | None:
+    """The main number of both runs over the draws of their spreads.
+
+    None if the runs have different main numbers or the same value, or one has no band of it.
+    """
+    first, second = runs
+    main = headline(first.results)
+    if main != headline(second.results) or first.draws is None or second.draws is None:
+        return None
+    for number in numbers:
+        if number.quantity == main and number.differs:
+            quantity = declared(main)
+            if all(band_of(run.results, quantity) for run in runs):
+                return compare_draws(first.draws, second.draws, main, quantity.si_unit)
+    return None
+
+
 def _number(value: Any) -> float:
     """A value of a result as a number; NaN if there is none, or if it is text."""
     if value is None or isinstance(value, str):
@@ -280,8 +308,15 @@ def _number(value: Any) -> float:
 # --- text of results ------------------------------------------------------------------------------
 
 
-def _results_text(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]) -> list[str]:
-    """Paragraphs: numbers that differ, their errors, warnings of the runs, numbers that do not."""
+def _results_text(
+    numbers: Sequence[_ComparedNumber],
+    runs: Sequence[_FinishedRun],
+    draws: ComparedDraws | None,
+) -> list[str]:
+    """Paragraphs: numbers that differ, their errors, draws, warnings, numbers that do not differ.
+
+    The draws are those of the main number over both spreads; None if there are none.
+    """
     differing_numbers = []
     same = []
     for number in numbers:
@@ -292,9 +327,11 @@ def _results_text(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRu
     paragraphs = []
     if differing_numbers:
         paragraphs += _table_of_numbers(differing_numbers, runs)
-    errors = _error_lines(differing_numbers, runs)
+    errors = _error_lines(differing_numbers, runs, draws)
     if errors:
         paragraphs.append("\n".join(errors))
+    if draws is not None:
+        paragraphs.append(compared_draws_text(draws, runs[0].name, runs[1].name))
     warnings = []
     for run in runs:
         warnings += [f"{run.name}: warning: {warning}" for warning in run.results.warnings]
@@ -394,7 +431,9 @@ def _signed_difference(number: _ComparedNumber) -> str:
 
 
 def _error_lines(
-    differing_numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]
+    differing_numbers: Sequence[_ComparedNumber],
+    runs: Sequence[_FinishedRun],
+    draws: ComparedDraws | None,
 ) -> list[str]:
     """Lines on how certain the differences are; none if no velocity or main number differs.
 
@@ -409,7 +448,7 @@ def _error_lines(
             times = error_text(abs(number.difference) / number.numerical_error, "")
             lines.append(f"{number.quantity}: differs by {times} times its numerical error")
     if any(headline(run.results) in number_by_name for run in runs):
-        lines += _band_lines(runs)
+        lines += _band_lines(runs, draws)
     # The field of `not_computed` tells whether the numerical error is missing.
     unmeasured = [run for run in runs if not_computed(run.results).numerical_error]
     if velocities and unmeasured:
@@ -418,8 +457,11 @@ def _error_lines(
     return lines
 
 
-def _band_lines(runs: Sequence[_FinishedRun]) -> list[str]:
-    """The band of each run, and the number of uncertain values that both runs have in common."""
+def _band_lines(runs: Sequence[_FinishedRun], draws: ComparedDraws | None) -> list[str]:
+    """The band of each run, and the number of uncertain values that both runs have in common.
+
+    Compared draws, which have a paragraph of their own, say more than this number.
+    """
     lines = []
     for run in runs:
         band = _band_text(run.results)
@@ -427,7 +469,7 @@ def _band_lines(runs: Sequence[_FinishedRun]) -> list[str]:
             lines.append(f"{run.name}: {band}")
     first, second = runs
     shared = _uncertain_keys(first.results) & _uncertain_keys(second.results)
-    if shared:
+    if shared and draws is None:
         values = f"the runs have {counted(len(shared), 'uncertain value')} in common"
         lines.append(
             f"{values}, which may shift both results alike: "

@@ -13,14 +13,17 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from walkers.arrays import FloatArray
 from walkers.errors import InputError, check_limits, input_error, key_error
-from walkers.files import write_json
+from walkers.files import read_json, write_json
 from walkers.inputs.axes import ranges_of, unit_cube, value_in_unit
 from walkers.inputs.messages import attributed_to
 from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import SweepDefinition, expand
 from walkers.inputs.tables.case import Case
-from walkers.inputs.units import parse_quantity
+from walkers.inputs.units import parse_quantity, unit_factor
 from walkers.postprocess.measure.numbers import MAIN_NUMBERS
 from walkers.postprocess.measure.quantities import declared, unit_shown
 from walkers.postprocess.measure.sides import REST
@@ -37,6 +40,7 @@ from walkers.rounding import counted, rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.run_directory import run_place
 from walkers.runs.case_text import quantity_kind
+from walkers.runs.draws import Draws, Unknown
 from walkers.sweeps.correlations import rank_correlations
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.left_out import LeftOutWarning
@@ -213,7 +217,6 @@ def _number_in_unit(value: Origin, unit: str | None) -> float:
 
 def _least_correlated_seed(values: int, points: int) -> int:
     """The seed for which the draws of the values are least correlated with each other."""
-    import numpy as np
 
     def largest_correlation(seed: int) -> float:
         cube = unit_cube(values, points, seed)
@@ -357,6 +360,61 @@ def _band_of(numbers: pd.Series) -> dict[str, float]:
     band = dict(zip(names, ends.tolist(), strict=True))
     band["points"] = int(numbers.count())
     return band
+
+
+def draws_of(run: Path) -> Draws | None:
+    """The finished draws of the spread of a run.
+
+    None if the run has no spread, or its files cannot be read.
+
+    Parameters
+    ----------
+    run
+        The run directory.
+    """
+    import pandas as pd
+
+    directory = spread_of(run.resolve())
+    try:
+        varied = read_json(directory / SPREAD_NAME)["varied"]
+        unknowns = {value["key"]: _unknown_of(value) for value in varied}
+        frame = table_of(read_sweep_record(directory)).frame
+        finished = frame[frame["status"] == "finished"]
+        columns = [_in_si_units(finished, key) for key in unknowns]
+    except (InputError, OSError, ValueError, KeyError, TypeError):
+        return None  # as for the bands: there is no spread, or a file is damaged
+    walking = finished.index.isin(walking_points(finished).index)
+    numbers = {}
+    for name in MAIN_NUMBERS:
+        if name in finished:
+            column = pd.to_numeric(finished[name], errors="coerce").where(walking)
+            numbers[name] = column.to_numpy(dtype=float)
+    return Draws(unknowns, np.column_stack(columns), numbers)
+
+
+def _unknown_of(value: Mapping[str, Any]) -> Unknown:
+    """An uncertain value, from its entry in the file of a spread."""
+    kind = quantity_kind(value["key"])
+    ends = []
+    for end in value["range"]:
+        ends.append(parse_quantity(end, kind) if kind and isinstance(end, str) else float(end))
+    low, high = ends
+    return Unknown(
+        value=value["value"],
+        low=low,
+        high=high,
+        logarithmic=value["logarithmic"],
+        text=value["text"],
+        range_text=" to ".join(map(str, value["range"])),
+    )
+
+
+def _in_si_units(frame: pd.DataFrame, key: str) -> FloatArray:
+    """The drawn values of a key in SI units, shape (N,)."""
+    kind = quantity_kind(key)
+    unit = frame.attrs["units"][key]
+    factor = unit_factor(unit, kind.unit) if kind and unit else 1.0
+    return factor * frame[key].to_numpy(dtype=float)
 
 
 def figures_of_spread(run: Path) -> dict[str, Figure]:
