@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.files import write_bytes
+from walkers.postprocess.measure.uncertainty import OF_OTHERS
 from walkers.postprocess.show.drawing import (
     TWO_COLUMNS,
     letter_panels,
@@ -102,8 +103,10 @@ def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
         "height (mm)": _range_text(climbs["heights"], 1e3),
         "speed (mm/s)": _range_text(climbs["speeds"], 1e3),
         "median speed (mm/s)": _two_digits(median_speed),
-        "guessed": ", ".join(climbs.get("guessed", [])) or _MISSING,
+        "guessed": _MISSING,
     }
+    if climbs.get("guessed"):
+        texts["guessed"] = f"{', '.join(climbs['guessed'])} ({OF_OTHERS})"
     return texts
 
 
@@ -148,7 +151,7 @@ def climbing_table(climbs: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     -------
     pandas.DataFrame
         For each ``condition`` a row for all climbs, for those on plain walls and for those in
-        corners (``where``). The ends of intervals have columns of their own, such as ``rate_low``
+        corners (``where``). ``guessed`` has the values of its case that were guessed. The ends of intervals have columns of their own, such as ``rate_low``
         and ``rate_high``; NaN where there is no interval.
     """
     import pandas as pd
@@ -158,6 +161,7 @@ def climbing_table(climbs: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
         for subset in _SUBSETS:
             row = {"condition": condition["condition"], "where": subset.label}
             row |= _table_row(subset.numbers_in(condition))
+            row["guessed"] = ", ".join(condition.get("guessed", []))
             rows.append(row)
     return pd.DataFrame(rows)
 

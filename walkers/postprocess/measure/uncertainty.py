@@ -33,6 +33,8 @@ ACCURACY_NAME = "accuracy.json"
 """Name of the file with the numerical errors in a run directory."""
 LEAST_PER_VALUE = 3
 """Least number of draws per varied value (`few_draws`)."""
+OF_OTHERS = "not of these materials and this liquid"
+"""What guessed values are."""
 _LEAST = 6
 """Least number of draws: of five, no rank correlation is larger than two standard errors, 2/√4."""
 _TERMINAL_WIDTH = 110
@@ -92,7 +94,7 @@ def uncertain_value_lines(values: Sequence[Mapping[str, Any]]) -> list[str]:
     for value in values:
         values_by_head.setdefault(_head_of(value), []).append(_value_text(value))
     if "guessed" in values_by_head:
-        values_by_head["guessed"][-1] += " (not of these materials and this liquid)"
+        values_by_head["guessed"][-1] += f" ({OF_OTHERS})"
     lines: list[str] = []
     for head in _HEADS:
         if head in values_by_head:
