@@ -840,6 +840,10 @@ class Sweep:
         panels: str | None = None,
         log: Log | None = None,
         theory: bool = False,
+        data_files: str | Path | Sequence[str | Path] = (),
+        width: str | None = None,
+        font_size: float | None = None,
+        title: str | None = None,
     ) -> Figure:
         """Make a matplotlib figure of a column of the table.
 
@@ -860,6 +864,18 @@ class Sweep:
             log-uniformly always is.
         theory
             Also draw the predictions of the theory.
+        data_files
+            Files with points of your own, such as measured ones, each as its path or as
+            ``LABEL=PATH``. The header names the columns like the axes, with units that are
+            converted to those of the axes: ``peak_acceleration (g)``, ``velocity (mm/s)``; columns
+            ``velocity error (mm/s)`` have error bars.
+        width
+            Width of the figure, such as ``85mm``; default: 7 inches. The height follows.
+        font_size
+            Size of all texts in points; default: 8, and 7 of tick labels and legends.
+        title
+            Text above the figure, or ``none``; default: the title of the sweep, and what its bars
+            and bands are.
 
         Returns
         -------
@@ -870,14 +886,26 @@ class Sweep:
         Raises
         ------
         InputError
-            If a key or column does not exist, or no point is finished.
+            If a key, column or file does not exist, a unit is not understood, or no point is
+            finished.
 
         Examples
         --------
         >>> walkers.sweep("fig4", tmp).figure(x="liquid.name", log="y").axes[0].get_yscale()
         'log'
         """
-        options = FigureOptions(x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)
+        options = FigureOptions(
+            x=x,
+            y=y,
+            hue=hue,
+            panels=panels,
+            log=log,
+            theory=theory,
+            data_files=[data_files] if isinstance(data_files, (str, Path)) else data_files,
+            width=width,
+            font_size=font_size,
+            title=title,
+        )
         if in_notebook():
             import matplotlib.pyplot as plt
 
@@ -895,6 +923,10 @@ class Sweep:
         panels: str | None = None,
         log: Log | None = None,
         theory: bool = False,
+        data_files: str | Path | Sequence[str | Path] = (),
+        width: str | None = None,
+        font_size: float | None = None,
+        title: str | None = None,
     ) -> Pictures:
         """Plot a column of the table to a file.
 
@@ -903,7 +935,7 @@ class Sweep:
         to
             The file, .png, .svg or .pdf; default: a PNG in the directory of the sweep, named after
             the column.
-        x, y, hue, panels, log, theory
+        x, y, hue, panels, log, theory, data_files, width, font_size, title
             What the figure shows, see `figure`.
 
         Returns
@@ -916,7 +948,18 @@ class Sweep:
         InputError
             If a key or column does not exist, no point is finished, or the format is another one.
         """
-        options = FigureOptions(x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)
+        options = FigureOptions(
+            x=x,
+            y=y,
+            hue=hue,
+            panels=panels,
+            log=log,
+            theory=theory,
+            data_files=[data_files] if isinstance(data_files, (str, Path)) else data_files,
+            width=width,
+            font_size=font_size,
+            title=title,
+        )
         table = self._table
         place = _path(to) or self.directory / f"{column_of(table.frame, y)}.png"
         check_place(place, *(f".{form}" for form in FORMATS))

@@ -229,9 +229,9 @@ def _ratio_by_pint(unit: str, target: str) -> float:
     if _USUAL.get(target, ("", 1.0))[0] == ACCELERATION.unit:
         symbols = [_GRAM_SYMBOL.sub("gee", symbol) for symbol in symbols]
     try:
-        one, goal = [units.Quantity(1.0, units.parse_units(symbol)) for symbol in symbols]
-        factor = float(one.to(goal.units).magnitude)
-        roots = [str(quantity.to_root_units().units) for quantity in (one, goal)]
+        source, goal = [units.Quantity(1.0, units.parse_units(symbol)) for symbol in symbols]
+        factor = float(source.to(goal.units).magnitude)
+        roots = [str(quantity.to_root_units().units) for quantity in (source, goal)]
     except Exception as error:
         # As in `_factor_by_pint`.
         raise ValueError(expected) from error

@@ -86,7 +86,7 @@ def band_text(band: Band | None, unit: str) -> str:
 
 def draws_text(several: Sequence[ComparedDraws]) -> str:
     """The numbers of draws of several comparisons, and that bands are approximate if few."""
-    numbers = set()
+    numbers: set[int] = set()
     are_few = False
     for compared in several:
         numbers.update(compared.draws)

@@ -91,9 +91,10 @@ def _text(table: SweepTable, points: Mapping[int, ComparedDraws]) -> str:
             rows.append([*names, *cells])
             names = [""] * len(names)
         sentences += [f"point {point}: {reason}" for reason in reasons(compared)]
+    first = ", ".join(texts.astype(str).iloc[0])
     title = (
         f"{table.frame.attrs['sweep']}: {with_unit(several[0].quantity, unit)} of each point "
-        f"against point 0 ({', '.join(texts.loc[0])})"
+        f"against point 0 ({first})"
     )
     meaning = (
         "difference: less point 0; ratio: over point 0; median and in brackets 5 to 95 % of "

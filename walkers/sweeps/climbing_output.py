@@ -151,8 +151,9 @@ def climbing_table(climbs: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     -------
     pandas.DataFrame
         For each ``condition`` a row for all climbs, for those on plain walls and for those in
-        corners (``where``). ``guessed`` has the values of its case that were guessed. The ends of intervals have columns of their own, such as ``rate_low``
-        and ``rate_high``; NaN where there is no interval.
+        corners (``where``). The ends of intervals have columns of their own, such as ``rate_low``
+        and ``rate_high``; NaN where there is no interval. ``guessed`` has the values of the case
+        that were guessed.
     """
     import pandas as pd
 

@@ -5,8 +5,10 @@ Nothing that takes long is imported.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -34,6 +36,16 @@ class FigureOptions:
         Sweeps: which axes are logarithmic.
     theory
         Sweeps: also draw the theory.
+    data_files
+        Sweeps: also draw points of your own, from a text file with a header such as
+        "peak_acceleration (g),velocity (mm/s),velocity error (mm/s)", or LABEL=FILE. Repeatable.
+    width
+        Sweeps: width of the figure, such as 85mm; default: 7in.
+    font_size
+        Sweeps: size of all texts, points; default: 7 and 8.
+    title
+        Sweeps: text above the figure, or none; default: the title of the sweep, and what bars and
+        bands are.
     """
 
     x: str | None = None
@@ -42,3 +54,9 @@ class FigureOptions:
     panels: str | None = None
     log: Log | None = None
     theory: bool = False
+    data_files: Annotated[
+        Sequence[str | Path], Parameter("--data", metavar="FILE", show_default=False)
+    ] = ()
+    width: str | None = None
+    font_size: float | None = None
+    title: str | None = None
