@@ -25,6 +25,7 @@ from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.measure.results import Results, ensure_measured, read_results
 from walkers.postprocess.measure.results import text as result_text
+from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.postprocess.measure.tables import read_table
 from walkers.postprocess.show.drawing import FORMATS, check_place, save_figure
 from walkers.postprocess.show.figures import plot_run
@@ -79,13 +80,14 @@ if TYPE_CHECKING:
     from walkers.inputs.origins import Origin
     from walkers.inputs.tables.case import Case
 
-Export = Literal["deck", "vtk", "lammps", "archive"]
+Export = Literal["deck", "vtk", "lammps", "csv", "archive"]
 """Forms of exports."""
 
 _OPTIONS_OF_FORMS: Mapping[str, tuple[str, ...]] = {
     "deck": (),
     "vtk": ("every",),
     "lammps": ("every",),
+    "csv": ("units",),
     "archive": ("dumps", "authors", "licence"),
 }
 """Options of `Run.export` that each form takes."""
@@ -545,6 +547,7 @@ class Run:
         to: str | Path | None = None,
         *,
         every: int | None = None,
+        units: UnitSystem | None = None,
         dumps: bool = True,
         authors: Sequence[str] = (),
         licence: str | None = None,
@@ -555,13 +558,16 @@ class Run:
         ----------
         form
             ``deck``: the LIGGGHTS deck of the case. ``vtk``: files for ParaView. ``lammps``: the
-            trajectory as a LAMMPS dump. ``archive``: a zip file with checksums, to publish.
+            trajectory as a LAMMPS dump. ``csv``: all tables and the numbers of the result as CSV
+            files, with units in their headers. ``archive``: a zip file with checksums, to publish.
         to
-            The file, for ``vtk`` and ``deck`` a folder. Default: in the run directory, for
+            The file, for ``vtk``, ``csv`` and ``deck`` a folder. Default: in the run directory, for
             ``archive`` and ``deck`` in the current folder.
         every
             ``vtk``, ``lammps``: write every Nth sample; default: one per cycle; for ``lammps`` and
             piles all.
+        units
+            ``csv``: ``SI``, or ``mm`` for mm, mm/s, g (9.8 m/s²), µN, nJ and degrees; default: SI.
         dumps
             ``archive``: whether to include the dumps of the engine.
         authors
@@ -572,7 +578,8 @@ class Run:
         Returns
         -------
         Path
-            The written file; for ``deck`` and ``vtk`` the main file in the folder.
+            The written file; for ``deck`` and ``vtk`` the main file in the folder, for ``csv`` the
+            folder.
 
         Raises
         ------
@@ -587,6 +594,8 @@ class Run:
         chosen = []
         if every is not None:
             chosen.append("every")
+        if units is not None:
+            chosen.append("units")
         if not dumps:
             chosen.append("dumps")
         if authors:
@@ -607,6 +616,10 @@ class Run:
             from walkers.postprocess.show.lammps import write_trajectory
 
             return write_trajectory(directory, place, every=every)
+        if form == "csv":
+            from walkers.postprocess.show.csv_tables import write_csv
+
+            return write_csv(directory, place, units=units or "SI")
         from walkers.archive.writing import write_archive
 
         return write_archive(directory, place, dumps=dumps, authors=authors, licence=licence)
@@ -1015,6 +1028,8 @@ class Sweep:
 
         if form != "archive":
             text = f"is a sweep: expected one of its runs for {form}, or archive"
+            if form == "csv":
+                text += f"; for its table: walkers list {self.directory} --to table.csv"
             raise input_error(self.directory, text)
         return write_archive(
             self.directory, _path(to), dumps=dumps, authors=authors, licence=licence

@@ -126,7 +126,7 @@ ALL_COMMANDS = (
         place="walkers.commands.keep:export",
         summary=(
             "Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, "
-            "or an archive to publish."
+            "CSV tables, or an archive to publish."
         ),
     ),
     Command(

@@ -15,6 +15,7 @@ from walkers import DEFAULT_OUT
 from walkers.api import Export, check_export, directory_of
 from walkers.commands.options import LookupOptions, OutOption, RunOrSweepArgument, refuse, tell
 from walkers.errors import apply_all
+from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.runner.run_directory import UNFINISHED
 from walkers.runs.by_hand import as_run, write_folder
 from walkers.runs.names import find
@@ -36,6 +37,8 @@ class ExportOptions:
     ----------
     every
         vtk, lammps: write every Nth sample; default: one per cycle; for lammps and piles all.
+    units
+        csv: SI, or mm for mm, mm/s, g (9.8 m/s^2), µN, nJ and degrees; default: SI.
     dumps
         archive: leave out the engine's dumps; tables and results are included.
     authors
@@ -45,6 +48,7 @@ class ExportOptions:
     """
 
     every: int | None = None
+    units: UnitSystem | None = None
     dumps: Annotated[bool, Parameter("--without-dumps")] = False
     authors: Annotated[list[str] | None, Parameter("--author")] = None
     licence: str | None = None
@@ -59,15 +63,16 @@ def export(
     lookup: LookupOptions = LookupOptions(),
     options: ExportOptions = ExportOptions(),
 ) -> None:
-    """Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, or an archive
-    to publish.
+    """Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, CSV tables, or
+    an archive to publish.
 
     Parameters
     ----------
     form
         Format of the export. deck: LIGGGHTS deck of the case. vtk: .vtu files, their .pvd, and the
         script show.py that shows them in ParaView. lammps: the trajectory as a LAMMPS dump, for
-        OVITO, ASE, MDAnalysis. archive: a zip file with checksums, to publish.
+        OVITO, ASE, MDAnalysis. csv: a folder of all tables, with units. archive: a zip file with
+        checksums, to publish.
     to
         File or folder to write; default: in the run's folder, archives in the current folder.
         Decks are printed.
@@ -85,6 +90,8 @@ def _given_options(options: ExportOptions) -> dict[str, Any]:
     given: dict[str, Any] = {}
     if options.every is not None:
         given["every"] = options.every
+    if options.units is not None:
+        given["units"] = options.units
     if options.dumps:  # the option is --without-dumps
         given["dumps"] = False
     if options.authors is not None:

@@ -21,6 +21,7 @@ from walkers.commands.options import (
     refuse,
     refuse_any,
 )
+from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.postprocess.show.film_options import FilmOptions, Seconds
 from walkers.sweeps.figure_options import FigureOptions
 
@@ -33,6 +34,7 @@ def list_(
     every: Annotated[bool, Parameter("--all")] = False,
     where: Annotated[list[str] | None, Parameter(metavar="KEY=VALUE")] = None,
     to: Path | None = None,
+    units: UnitSystem | None = None,
     as_json: JsonOption = False,
 ) -> None:
     """List runs and sweeps with status, result, age and size, or print the table of one sweep.
@@ -47,13 +49,17 @@ def list_(
         Only runs with this value, such as "drive.frequency=80 Hz". Repeatable.
     to
         Write the table of the sweep, with units, to this file (.csv, .parquet, .json).
+    units
+        Units of --to: SI, or mm for mm, mm/s, g (9.8 m/s^2), µN, nJ and degrees; default: SI. Keys
+        that vary keep the units of the sweep file.
     """
     from walkers.runs.listing import select
     from walkers.sweeps import listing
 
+    refuse("--units", units is not None and to is None, "is for --to")
     if sweep is not None:
         refuse_any({"where": where, "all": every}, "is for folders, not for a sweep")
-        _list_points(sweep, out, to, as_json)
+        _list_points(sweep, out, to, units or "SI", as_json)
         return
     refuse("--to", to is not None, "expected a sweep, whose table is written")
     entries = listing.inventory(out)
@@ -66,9 +72,10 @@ def list_(
     print_as(as_json, lambda: listing.as_json(shown), lambda: listing.listing_text(shown, hidden))
 
 
-def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
+def _list_points(name: str, out: Path, to: Path | None, units: UnitSystem, as_json: bool) -> None:
     """Print the points of a sweep, or write its table."""
     from walkers.api import Sweep
+    from walkers.postprocess.measure.table_units import in_units
     from walkers.runs.names import find
     from walkers.sweeps import table
 
@@ -83,7 +90,8 @@ def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
     )
     sweep = Sweep(reference.path)
     if to is not None:
-        table.write_table_file(sweep.table(), to)
+        frame = sweep.table()
+        table.write_table_file(in_units(frame, units, frame.attrs["varied"]), to)
         print(to)
     elif as_json:
         print(table.encoded(sweep.table(), "json").decode(), end="")

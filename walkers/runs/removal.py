@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from walkers.files import VTK_SCRATCH, abandoned
+from walkers.files import CSV_SCRATCH, VTK_SCRATCH, abandoned
 from walkers.rounding import counted, duration_text
 from walkers.runner import run_directory
 from walkers.runner.manifest import MANIFEST_NAME
@@ -117,6 +117,7 @@ def _abandoned_exports(out: Path, runs: Sequence[ListEntry]) -> list[Path]:
     exports = []
     for parent in parents:
         exports += abandoned(parent, VTK_SCRATCH)
+        exports += abandoned(parent, CSV_SCRATCH)
     return exports
 
 

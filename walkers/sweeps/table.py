@@ -43,6 +43,7 @@ from walkers.postprocess.measure.quantities import (
 )
 from walkers.postprocess.measure.results import Results, modules_of
 from walkers.postprocess.measure.sides import SEPARATED
+from walkers.postprocess.measure.tables import pandas_metadata
 from walkers.rounding import counted, rounded
 from walkers.runner.run_directory import case_of
 from walkers.runs.case_text import short_keys
@@ -405,7 +406,7 @@ def encoded(frame: pd.DataFrame, form: str) -> bytes:
     """A sweep's table as the contents of a file, in one of `TABLE_FORMATS`.
 
     CSV has the units in its head, JSON has units and meanings beside the points, and parquet has
-    both in the metadata of its columns.
+    both in the metadata of its columns, and all ``attrs`` of the frame for pandas.
     """
     if form == "csv":
         return _csv_bytes(frame)
@@ -438,7 +439,8 @@ def _parquet_bytes(frame: pd.DataFrame) -> bytes:
     for column in table.schema:
         metadata = {"unit": units[column.name], "meaning": meanings[column.name]}
         fields.append(column.with_metadata(metadata))
-    schema = pa.schema(fields, metadata=table.schema.metadata)
+    metadata: dict[Any, Any] = {**(table.schema.metadata or {}), **pandas_metadata(frame.attrs)}
+    schema = pa.schema(fields, metadata=metadata)
     buffer = io.BytesIO()
     pq.write_table(table.cast(schema), buffer, compression="zstd")
     return buffer.getvalue()
