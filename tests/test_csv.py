@@ -14,6 +14,7 @@ import walkers
 from tests.conftest import TINY, call
 from walkers.errors import InputError
 from walkers.postprocess.measure.quantities import TABLES
+from walkers.postprocess.measure.table_units import in_units
 from walkers.postprocess.measure.tables import read_table
 from walkers.runs.removal import unfinished_in
 
@@ -134,6 +135,16 @@ def test_the_table_of_a_sweep_is_written_in_other_units(
     for key in table.attrs["varied"]:
         unit = table.attrs["units"][key]
         assert written[f"{key} ({unit})" if unit else key].tolist() == table[key].tolist()
+
+
+def test_keys_that_vary_are_not_converted() -> None:
+    """Whatever their unit is."""
+    table = pd.DataFrame({"dimers.spacing": [0.5], "distance": [0.5]})
+    table.attrs["units"] = {"dimers.spacing": "m", "distance": "m"}
+    converted = in_units(table, "mm", ["dimers.spacing"])
+    assert converted.to_dict("list") == {"dimers.spacing": [0.5], "distance": [500.0]}
+    assert converted.attrs["units"] == {"dimers.spacing": "m", "distance": "mm"}
+    assert table.attrs["units"]["distance"] == "m"
 
 
 def test_units_of_a_list_need_a_file(looked_through: Path) -> None:
