@@ -1499,7 +1499,7 @@ def test_names_of_the_library_that_are_similar_are_proposed(command: str, messag
         ("run", "CASE"),
         (
             "export fig1b",
-            "--to requires an argument. Choose from: deck, vtk, lammps, archive. "
+            "--to requires an argument. Choose from: deck, vtk, lammps, csv, archive. "
             "See: walkers export --help",
         ),
         ("check fig1b --without magic", "--without magic: expected one of"),

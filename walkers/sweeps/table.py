@@ -439,7 +439,8 @@ def _parquet_bytes(frame: pd.DataFrame) -> bytes:
     for column in table.schema:
         metadata = {"unit": units[column.name], "meaning": meanings[column.name]}
         fields.append(column.with_metadata(metadata))
-    file_metadata: dict[Any, Any] = {**(table.schema.metadata or {}), **pandas_metadata(frame.attrs)}
+    file_metadata: dict[Any, Any] = dict(table.schema.metadata or {})
+    file_metadata |= pandas_metadata(frame.attrs)
     schema = pa.schema(fields, metadata=file_metadata)
     buffer = io.BytesIO()
     pq.write_table(table.cast(schema), buffer, compression="zstd")
