@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import resource
 import time
-import warnings
 from collections import Counter
 from collections.abc import Collection, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
@@ -65,6 +64,7 @@ from walkers.sweeps.workers import (
     threads,
 )
 from walkers.text import with_unit
+from walkers.warning import warn_user
 
 if TYPE_CHECKING:
     from parsl.config import Config
@@ -399,11 +399,10 @@ def _warn_if_replaced(record: SweepRecord) -> None:
     with suppress(InputError):  # no sweep of this name, or none that can be read
         earlier = read_sweep_record(record.directory)
         if set(earlier.runs).isdisjoint(record.runs):
-            warnings.warn(
+            warn_user(
                 f"{record.directory}: replaces a sweep of the same name without common runs; "
                 "figures and reports there show the old one",
                 SweepReplacedWarning,
-                stacklevel=3,
             )
 
 
