@@ -22,7 +22,7 @@ from walkers.inputs.config_table import changed
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.library import library_of, unmeasured
-from walkers.inputs.resolving.loads import gravity_warnings
+from walkers.inputs.resolving.plausibility import drive_warnings, gravity_warnings
 from walkers.inputs.sweep import expand
 from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.units import parse_quantity, quantity_text

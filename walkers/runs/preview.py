@@ -12,7 +12,8 @@ from typing import Any
 
 from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.library import library_of
-from walkers.inputs.resolving.loads import contact_loads, dimer_of, gravity_warnings
+from walkers.inputs.resolving.loads import contact_loads, dimer_of
+from walkers.inputs.resolving.plausibility import implausible
 from walkers.inputs.tables.bodies import Walkers
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.run import CONSTANT
@@ -46,11 +47,11 @@ _LONGEST_IN_SECONDS = 120.0
 def notes(case: Case) -> list[str]:
     """What a user should know about a case before it is run.
 
-    Notes are about a time step that is long or needlessly short, heavy beads, records and few
-    cores; for piles also about beads of a single size and about low walls.
+    Notes are about a time step that is long or needlessly short, heavy beads, drives whose unit may
+    be wrong, records and few cores; for piles also about beads of a single size and low walls.
     """
     lines = _time_step_notes(case)
-    lines += gravity_warnings(case)
+    lines += implausible(case)
     if case.excitation.record:
         lines += case.excitation.record.notes
     cores = cores_here()

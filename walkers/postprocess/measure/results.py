@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 from walkers.errors import InputError, input_error
 from walkers.files import read_json, write_json
 from walkers.inputs.resolving.length import limits_of
-from walkers.inputs.resolving.loads import gravity_warnings, softness_warning
+from walkers.inputs.resolving.loads import softness_warning
+from walkers.inputs.resolving.plausibility import implausible
 from walkers.postprocess.measure import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.measure.caption import conditions
 from walkers.postprocess.measure.measuring_module import MeasuringModule
@@ -198,7 +199,7 @@ def _general_warnings(motion: Motion) -> list[str]:
     softness = softness_warning(case)
     if softness is not None:
         warnings.append(softness)
-    warnings += gravity_warnings(case)
+    warnings += implausible(case)
     if motion.truncated:
         warnings.append("the dump ends within a frame")
     return warnings
