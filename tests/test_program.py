@@ -690,7 +690,14 @@ def test_compare_gives_what_its_command_prints(looked_through: Path) -> None:
 
 
 def test_compare_refuses_sweeps_in_the_words_of_its_command(looked_through: Path) -> None:
-    with pytest.raises(InputError, match=r"grid: is a sweep.s directory: walkers list"):
+    done = call("compare", "grid", "rough", "--out", str(looked_through))
+    assert done.returncode == 2
+    assert "grid: is a sweep's directory: walkers list" in done.stderr
+    assert "walkers.load" not in done.stderr
+
+
+def test_compare_refuses_sweeps_in_the_words_of_python(looked_through: Path) -> None:
+    with pytest.raises(InputError, match=r"grid: is a sweep.s directory: walkers\.load"):
         walkers.compare("grid", "rough", looked_through)
 
 

@@ -303,7 +303,7 @@ def _report_own_stop(
         def name_of(source: str) -> str:
             return source if source in tokens else _options_of(source, tokens, app)
 
-        return _tell(str(stop.renamed(name_of)), _BAD_INPUT)
+        return _tell(str(stop.in_command(name_of)), _BAD_INPUT)
     return _tell(str(stop), _FAILED)
 
 

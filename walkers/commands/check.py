@@ -66,7 +66,7 @@ def files(name: RunOrSweepArgument, /, *, lookup: LookupOptions = LookupOptions(
     from walkers.api import directory_of
     from walkers.archive.verification import verify
 
-    parts = verify(directory_of(name, lookup.out, lookup.values))
+    parts = verify(directory_of(lookup.find(name)))
     print_lines(part.describe() for part in parts)
     return 0 if all(part.passed for part in parts) else 1
 
@@ -95,12 +95,11 @@ def case(
     seeds
         Piles: number of random starts.
     """
-    from walkers.runs.names import find
     from walkers.second_engine.crosscheck import crosscheck, with_cycles
     from walkers.second_engine.engine import TERMS
     from walkers.second_engine.lines import as_dict, failures, lines_text
 
-    loaded = find(case, lookup.out, lookup.values).case
+    loaded = lookup.find(case).case
     terms = without or []
     refuse(
         "--seeds",

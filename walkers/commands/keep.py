@@ -18,7 +18,6 @@ from walkers.errors import apply_all
 from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.runner.run_directory import UNFINISHED
 from walkers.runs.by_hand import as_run, write_folder
-from walkers.runs.names import find
 from walkers.runs.removal import Removal, removal_text, remove, unfinished_in
 from walkers.sweeps.removal import removals_in
 from walkers.templates.deck import RUN_NAME, render_deck, single_segment
@@ -103,7 +102,7 @@ def _given_options(options: ExportOptions) -> dict[str, Any]:
 
 def _export_deck(name: str, to: Path | None, lookup: LookupOptions) -> None:
     """Print the deck of a case, or write its folder; with the cycles that its finished run took."""
-    reference = find(name, lookup.out, lookup.values)
+    reference = lookup.find(name)
     case = as_run(reference.case, reference.finished_run)
     if to is None:
         print(render_deck(case, single_segment(case)).text, end="")

@@ -186,7 +186,10 @@ def compare(
     second
         Another run or case, named in the same way; default: the first with the values of --set.
     """
-    comparison = walkers.compare(first, second, lookup.out, lookup.values)
+    second_case = None
+    if second is not None or lookup.changes:
+        second_case = lookup.find(second or first)
+    comparison = walkers.compare(first, second_case, lookup.out)
     print_as(as_json, lambda: comparison.contents, lambda: comparison.text)
 
 
@@ -211,5 +214,6 @@ def climb(
     from walkers.sweeps.climbing_output import describe_climbs
 
     refuse("RUN|SWEEP", not names, "expected sweeps, runs or cases of piles")
-    climbs = walkers.climb(names, lookup.out, lookup.values, within=within, to=to)
+    references = [lookup.find(name) for name in names]
+    climbs = walkers.climb(references, within=within, to=to)
     print_as(as_json, lambda: climbs, lambda: describe_climbs(climbs))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from cyclopts.completion import CompletionContext
 
     from walkers.api import Run, Sweep
+    from walkers.runs.names import Reference
 
 
 def _completions(context: CompletionContext) -> list[str]:
@@ -100,11 +101,19 @@ class LookupOptions:
 
         return settings_of(self.changes or ())
 
+    def find(self, name: str) -> Reference:
+        """What a name means; keys that ``--set`` replaces by others are told on standard error."""
+        from walkers.runs.names import find
+
+        reference = find(name, self.out, self.values)
+        tell_replaced(reference.replaced)
+        return reference
+
     def load(self, name: str) -> Run | Sweep:
         """The named run or sweep."""
         from walkers.api import load
 
-        return load(name, self.out, self.values)
+        return load(self.find(name))
 
     def run(self, name: str) -> Run:
         """The named run; `InputError` if the name is that of a sweep."""
@@ -150,6 +159,18 @@ def print_lines(lines: Iterable[object]) -> None:
     """Print one item per line, such as the paths of written files."""
     for line in lines:
         print(line)
+
+
+def tell_replaced(replaced: Mapping[str, Sequence[str]]) -> None:
+    """Tell which keys of a case the keys of ``--set`` replace, a line for each of these.
+
+    Parameters
+    ----------
+    replaced
+        The replaced keys by the keys that replace them.
+    """
+    for key, former in replaced.items():
+        tell(f"{key} replaces {', '.join(former)} of the case")
 
 
 def tell(*messages: str) -> None:

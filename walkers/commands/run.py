@@ -20,6 +20,7 @@ from walkers.commands.options import (
     print_lines,
     refuse,
     tell,
+    tell_replaced,
 )
 from walkers.errors import apply_all
 from walkers.progress import progress_of
@@ -77,10 +78,9 @@ def show(
     if theory:
         _show_theory(case, lookup, as_json)
         return
-    from walkers.runs.names import find
     from walkers.runs.preview import preview_text, summarise
 
-    summary = summarise(find(case, lookup.out, lookup.values).case)
+    summary = summarise(lookup.find(case).case)
     print_as(as_json, lambda: summary, lambda: preview_text(summary))
 
 
@@ -88,7 +88,7 @@ def _show_theory(case: str, lookup: LookupOptions, as_json: bool) -> None:
     """Print the prediction of the theory, beside the result of the run if there is one."""
     from walkers.theory.prediction_text import prediction_text
 
-    prediction = walkers.predict(case, lookup.out, lookup.values)
+    prediction = walkers.predict(lookup.find(case))
     result_of_run = prediction["engine"]
     print_as(as_json, lambda: prediction, lambda: prediction_text(prediction, result_of_run))
 
@@ -136,7 +136,6 @@ def run(
     """
     from walkers.api import case_to_run, finished_run_of
     from walkers.runner.failures import EngineFailure
-    from walkers.runs.names import find
     from walkers.runs.preview import notes
     from walkers.sweeps.accuracy import modulus_factors
     from walkers.sweeps.spread import spread_sweep
@@ -144,7 +143,7 @@ def run(
     refuse("CASE", not cases, "expected a case, such as fig1b")
     draws = _number_of_draws(spread, points)
     # Report a mistake in the last file before the first run starts.
-    references = [find(case, lookup.out, lookup.values) for case in cases]
+    references = [lookup.find(case) for case in cases]
     finished_runs: list[walkers.Run | None] = [None] * len(references)
     if not force:
         finished_runs = apply_all(finished_run_of, references)
@@ -233,6 +232,7 @@ def sweep(
 
     draws = _number_of_draws(spread, points)
     loaded = load_sweep(sweep, lookup.values)
+    tell_replaced(loaded.replaced_by(lookup.values))
     refuse(
         "--jobs",
         jobs is not None and site is not None,

@@ -17,7 +17,7 @@ from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, PydanticUndefined
 
 from walkers.errors import InputError, Problem, key_error, quoted
-from walkers.inputs.keys import joined, parts_of
+from walkers.inputs.keys import MISSING, joined, parts_of, value_at
 from walkers.inputs.units import WRITTEN, is_auto, kind_in
 
 T = TypeVar("T")
@@ -318,6 +318,22 @@ class ConfigTable(BaseModel):
                     yield cls.missing(name, place, instead)
 
     @classmethod
+    def replaced_by(cls, name: str, _value: object) -> set[str]:
+        """The keys of this table that a new value of a key replaces.
+
+        Parameters
+        ----------
+        name
+            The key.
+        _value
+            The value as a file has it. Most tables do not depend on it.
+        """
+        replaced: set[str] = set()
+        for choice in cls.choices:
+            replaced |= choice.excluded_by(name)
+        return replaced
+
+    @classmethod
     def missing(cls, name: str, place: str, instead: str = "") -> Problem:
         """The problem of a missing key.
 
@@ -441,8 +457,19 @@ def contradictions(model: type[ConfigTable], document: Any, place: str = "") -> 
             yield from contradictions(table, value, inner_place)
 
 
-def alternatives(model: type[ConfigTable], name: str) -> set[str]:
-    """The dotted keys that a dotted key of a kind of file excludes."""
+def alternatives(model: type[ConfigTable], name: str, value: object = None) -> set[str]:
+    """The dotted keys that a dotted key of a kind of file excludes.
+
+    Parameters
+    ----------
+    model
+        The class of the whole file.
+    name
+        The dotted key.
+    value
+        The value of the key as a file has it: a shape excludes the sizes of other shapes. None: any
+        value.
+    """
     *path, last = parts_of(name)
     table: type[ConfigTable] | None = model
     if path:
@@ -450,11 +477,31 @@ def alternatives(model: type[ConfigTable], name: str) -> set[str]:
         table = table_class_of(dotted_keys(model).get(".".join(names_in_path)))
     if table is None:
         return set()
-    excluded = set()
-    for choice in table.choices:
-        for other_name in choice.excluded_by(str(last)):
-            excluded.add(joined([*path, other_name]))
-    return excluded
+    return {joined([*path, other_name]) for other_name in table.replaced_by(str(last), value)}
+
+
+def replaced_keys(
+    model: type[ConfigTable], document: Mapping[str, Any], changes: Mapping[str, Any]
+) -> dict[str, list[str]]:
+    """The keys of a document that changes replace by other keys.
+
+    Parameters
+    ----------
+    model, document, changes
+        As for `changed`.
+
+    Returns
+    -------
+    dict
+        For each change that replaces other keys of the document, these keys in alphabetical order.
+    """
+    replaced: dict[str, list[str]] = {}
+    for name, value in changes.items():
+        excluded = alternatives(model, name, value) - changes.keys()
+        given = [key for key in excluded if value_at(document, parts_of(key)) is not MISSING]
+        if given:
+            replaced[name] = sorted(given)
+    return replaced
 
 
 def changed(
@@ -484,7 +531,7 @@ def changed(
     """
     tables = copy.deepcopy(dict(document))
     for name, value in changes.items():
-        excluded = alternatives(model, name) - changes.keys()
+        excluded = alternatives(model, name, value) - changes.keys()
         _set_value_at(tables, name, copy.deepcopy(value), excluded)
     return tables
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from html import escape
 from math import hypot, isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -78,9 +79,9 @@ class ComparedRun:
     draws: Draws | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
-    """Differences of two runs or cases.
+    """Differences of two runs or cases; printed, it is the table.
 
     Attributes
     ----------
@@ -92,6 +93,13 @@ class Comparison:
 
     contents: Mapping[str, Any]
     text: str
+
+    def __repr__(self) -> str:
+        return self.text
+
+    def _repr_html_(self) -> str:
+        """The table in a notebook."""
+        return f"<pre>{escape(self.text)}</pre>"
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
+from walkers.errors import check_is_path
+
 Log = Literal["x", "y", "xy"]
 """Letters of logarithmic axes."""
 
@@ -60,3 +62,15 @@ class FigureOptions:
     width: str | None = None
     font_size: float | None = None
     title: str | None = None
+
+    def __post_init__(self) -> None:
+        """Raise `InputError` for names that are not text."""
+        names = {"x": self.x, "y": self.y, "hue": self.hue, "panels": self.panels}
+        for argument, name in names.items():
+            if name is not None:
+                check_is_path(argument, name, "the name of a key or a column")
+        files = self.data_files
+        for file in files if isinstance(files, (list, tuple)) else [files]:
+            check_is_path("data_files", file, "a file, or LABEL=FILE")
+        if self.width is not None:
+            check_is_path("width", self.width, "a width, such as 85mm")

@@ -126,9 +126,17 @@ class Spread:
         return contents
 
 
-def check_number_of_draws(points: int) -> None:
-    """Raise `InputError` if a number of draws is out of its limits, 2 to 4096."""
-    check_limits("points", points, 2, 4096)
+def check_number_of_draws(points: int, name: str = "points") -> None:
+    """Raise `InputError` if a number of draws is out of its limits, 2 to 4096.
+
+    Parameters
+    ----------
+    points
+        The number.
+    name
+        Name of the argument that gives it.
+    """
+    check_limits(name, points, 2, 4096, whole=True)
 
 
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> SweepDefinition:
