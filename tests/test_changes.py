@@ -189,7 +189,7 @@ def test_a_sweep_does_not_read_a_mesh_that_it_replaces(place: str, in_folder: Pa
     sweep = load_sweep(tables)
     (case,) = sweep.cases()
     again = expand(tables, source="record", name="record", base=("pile", sweep.base))
-    assert list(again.cases())[0].boundary == case.boundary
+    assert next(again.cases()).boundary == case.boundary
     assert case.boundary.vessel.height == pytest.approx(1e-3 * HEIGHT)
 
 

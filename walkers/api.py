@@ -179,8 +179,6 @@ def _call_that_runs(named: Reference) -> str:
         case = f'"{named.given}"'
     if named.changes:
         case = f"walkers.load_case({case}, {dict(named.changes)})"
-        if isinstance(named.given, Case):
-            case = f"walkers.load_case(case.document, {dict(named.changes)})"
     folder = "" if named.folder == DEFAULT_OUT else f', "{named.folder}"'
     return f"walkers.run({case}{folder})"
 

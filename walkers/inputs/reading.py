@@ -18,6 +18,7 @@ from walkers.errors import (
     check_utf8,
     input_error,
     key_error,
+    quoted,
     shortened,
     suggestion,
 )
@@ -59,14 +60,15 @@ def shipped(kind: str) -> dict[str, Path]:
 
 
 def load_case(
-    case: str | Path | Mapping[str, Any], changes: Mapping[str, Any] | None = None
+    case: Case | str | Path | Mapping[str, Any], changes: Mapping[str, Any] | None = None
 ) -> Case:
     """Read and resolve a case.
 
     Parameters
     ----------
     case
-        A TOML file, the name of a shipped case such as ``fig1b``, or the tables of a case file.
+        A TOML file, the name of a shipped case such as ``fig1b``, the tables of a case file, or a
+        resolved case, which keeps its name.
     changes
         Values that replace those of the file, by dotted keys, written as in a case file. A key also
         replaces those that say the same in other words, such as ``drive.gamma0`` a
@@ -93,6 +95,8 @@ def load_case(
     (0.0003, 0.00025)
     """
     check_changes(changes)
+    if not isinstance(case, (str, Path, Mapping)):
+        return _changed(case, changes or {})
     if isinstance(case, Mapping):
         document: Mapping[str, Any] = deepcopy(case)  # the caller may change its tables later
         source = "<case>"
@@ -106,6 +110,16 @@ def load_case(
     from walkers.inputs.case_building import build_case
 
     return build_case(document, source=source, name=name, changes=changes, check_ranges=True)
+
+
+def _changed(case: object, changes: Mapping[str, Any]) -> Case:
+    """A resolved case with other values; `InputError` for what is none."""
+    from walkers.inputs.case_building import changed_case
+    from walkers.inputs.tables.case import Case
+
+    if not isinstance(case, Case):
+        raise input_error("case", f"{quoted(case)}: expected a case, its file, name or tables")
+    return changed_case(case, changes)
 
 
 def read_case(
