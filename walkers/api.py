@@ -897,7 +897,7 @@ class Sweep:
     @cached_property
     def runs(self) -> list[Run]:
         """The runs of all points, finished or not."""
-        return [Run(self._record.out / name) for name in self._record.runs]
+        return [Run(place) for place in self._record.places]
 
     def table(self) -> pd.DataFrame:
         """The table of the sweep, one row per point.

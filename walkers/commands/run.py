@@ -275,7 +275,7 @@ def _print_plan(
     its uncertain values drawn from their ranges. None: no spread is asked for.
     """
     from walkers.sweeps.scheduler import plan_sweep
-    from walkers.sweeps.spread import spread_sweep
+    from walkers.sweeps.spread import plan_spread
 
     with progress_of(sweep.name) as advance:
         plan = plan_sweep(sweep, out, options, engine, advance)
@@ -285,7 +285,7 @@ def _print_plan(
     seconds = 0.0
     missing = 0
     for case in sweep.cases():
-        plan_of_spread = plan_sweep(spread_sweep(case, draws, engine), out, options, engine)
+        plan_of_spread = plan_spread(case, out, options, points=draws, engine=engine)
         seconds += plan_of_spread.core_seconds
         missing += len(plan_of_spread.missing)
     print(f"  spread     {missing} more runs, predicted {seconds:.0f} core-seconds")

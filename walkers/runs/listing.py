@@ -9,11 +9,12 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from stat import S_ISDIR
 from typing import Any
 
+from walkers import RECORDS
 from walkers.errors import InputError, input_error, suggestion
 from walkers.files import read_json
 from walkers.inputs.case_building import stored_case
@@ -48,7 +49,8 @@ class ListEntry:
     kind
         ``run`` or ``sweep``.
     name
-        Name of the directory without the ending of unfinished runs, such as ``fig1b-9845e7cce370``.
+        Name of the directory without the ending of unfinished runs, such as ``fig1b-9845e7cce370``;
+        of a run in the directory of a sweep, after the name of the sweep and a slash.
     case
         Name of the case; of a sweep, of its base case.
     status
@@ -98,7 +100,7 @@ class ListEntry:
 
 
 def runs_in(out: Path) -> list[ListEntry]:
-    """The runs in a folder, finished or not, sorted by name.
+    """The runs in a folder and in the sweeps in it, finished or not, sorted by name.
 
     Of two runs with the same name, the finished one comes first. Runs in progress without a
     directory, such as those in a shared deck, are among them.
@@ -108,13 +110,22 @@ def runs_in(out: Path) -> list[ListEntry]:
     InputError
         If the path is a file. A folder that does not exist has no runs.
     """
-    runs = []
+    runs = _runs_in_one_folder(out)
     for path in folders_in(out):
+        if (path / RECORDS["sweep"]).is_file():  # of a spread, whose draws are in it
+            for run in _runs_in_one_folder(path):
+                runs.append(replace(run, name=f"{path.name}/{run.name}"))
+    return sorted(runs, key=lambda run: (run.name, run.status != "finished"))
+
+
+def _runs_in_one_folder(folder: Path) -> list[ListEntry]:
+    """The runs in a folder, without those in sweeps."""
+    runs = []
+    for path in folders_in(folder):
         run = entry_of(path)
         if run is not None:
             runs.append(run)
-    runs += _without_directory(out, {place_of(run.directory) for run in runs})
-    return sorted(runs, key=lambda run: (run.name, run.status != "finished"))
+    return runs + _without_directory(folder, {place_of(run.directory) for run in runs})
 
 
 def folders_in(out: Path) -> list[Path]:

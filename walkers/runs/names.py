@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
+from glob import escape
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -217,6 +218,10 @@ def _meanings(path: Path, out: Path, *, is_shipped: bool) -> Iterator[tuple[Name
             yield "run", complete
         if run_directory.is_deck_folder(place) and not is_shipped:
             yield "deck", place
+    if run_directory.is_run_name(path.name):
+        for place in out.glob(f"*/{escape(path.name)}"):  # a draw of a spread, by its name alone
+            if (place.parent / RECORDS["sweep"]).is_file() and run_directory.is_finished(place):
+                yield "run", place
     sweep = out / path.stem
     if (sweep / RECORDS["sweep"]).is_file() and is_sweep_file(path):
         yield "sweep", sweep

@@ -10,6 +10,7 @@ so nothing is extrapolated.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from math import hypot, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,7 +62,7 @@ def measure_accuracy(
 ) -> dict[str, Any]:
     """Make the runs that measure the numerical errors of a finished run, and record the errors.
 
-    Finished runs are used again.
+    They are made in the directory of the sweep ``RUN-accuracy``. Finished runs are used again.
 
     Parameters
     ----------
@@ -95,6 +96,7 @@ def measure_accuracy(
     case = case_of(directory)
     possible = modulus_factors(case)
     _check_is_current(case, directory, engine)
+    options = replace(options, own_runs=True)
     numbers = recorded(directory)["numbers"]
     # The modulus is increased at least twice if the case allows it, and further only if necessary.
     for last in range(min(2, len(possible) - 1), len(possible)):

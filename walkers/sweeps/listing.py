@@ -54,7 +54,8 @@ def _entry_of_sweep(path: Path, sizes: Mapping[str, int]) -> ListEntry | None:
         return None
     points = Counter(state.status for state in states(record))
     size = 0
-    for run in set(record.runs):
+    runs = record.names_in_folder
+    for run in set(runs):
         size += sizes.get(run, 0)
     sweep = record.sweep
     numbers_of_values = FlatCase()
@@ -70,7 +71,7 @@ def _entry_of_sweep(path: Path, sizes: Mapping[str, int]) -> ListEntry | None:
         age=max(time.time() - (path / RECORD_NAME).stat().st_mtime, 0.0),
         size=size,
         points=dict(points),
-        runs=list(record.runs),
+        runs=runs,
         parameters=numbers_of_values,
     )
 

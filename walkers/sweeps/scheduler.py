@@ -105,6 +105,8 @@ class SweepOptions:
         Number of MPI processes of a deck.
     dumps
         Whether runs keep their dumps.
+    own_runs
+        Whether the runs are made in the directory of the sweep instead of beside it.
     """
 
     workers: int | None = None
@@ -114,6 +116,7 @@ class SweepOptions:
     final: frozenset[str] = frozenset()
     ranks: int = 1
     dumps: bool = True
+    own_runs: bool = False
 
     @property
     def decks_at_once(self) -> int:
@@ -258,7 +261,7 @@ def plan_sweep(
         problem = Problem("descend", None, "expected walkers: a pile has no velocity")
         raise InputError(sweep.source, [problem])
     runs = [run_place(case, binary, out).name for case in cases]
-    record = SweepRecord(out / sweep.name, sweep, runs)
+    record = SweepRecord(out / sweep.name, sweep, runs, has_own_runs=options.own_runs)
     if options.site is not None:
         check_path(record.directory)
     point_states = states(record)
@@ -408,8 +411,7 @@ def _warn_if_replaced(record: SweepRecord) -> None:
 
 def _measure_finished(record: SweepRecord) -> None:
     """Measure finished runs again whose results are out of date."""
-    for run in set(record.runs):
-        place = record.out / run
+    for place in set(record.places):
         if is_finished(place):
             # A run that cannot be measured is among the failures.
             with suppress(WalkersError, OSError, ValueError):
@@ -497,7 +499,7 @@ class _SweepLoop:
         task = DeckTask(
             runs=[self.record.runs[point] for point in deck.points],
             cases=[self.plan.cases[point] for point in deck.points],
-            out=self.record.out,
+            out=self.record.runs_folder,
             engine=self.plan.engine,
             time_limit=self.plan.options.time_limit,
             dumps=self.plan.options.dumps,
@@ -586,7 +588,7 @@ class _SweepLoop:
 
     def _place_of(self, deck: PlannedDeck) -> Path:
         """The run directory of the first point of a deck."""
-        return self.record.out / self.record.runs[deck.points[0]]
+        return self.record.runs_folder / self.record.runs[deck.points[0]]
 
     def _seconds_left(self) -> float:
         """Predicted time on one core of what is left of all decks, s."""

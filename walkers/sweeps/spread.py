@@ -45,7 +45,7 @@ from walkers.sweeps.correlations import rank_correlations
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.left_out import LeftOutWarning
 from walkers.sweeps.record import read_sweep_record
-from walkers.sweeps.scheduler import SweepOptions, run_sweep
+from walkers.sweeps.scheduler import SweepOptions, SweepPlan, plan_sweep, run_sweep
 from walkers.sweeps.table import main_columns, table_of, walking_points
 from walkers.sweeps.workers import Failure
 
@@ -235,6 +235,26 @@ def _least_correlated_seed(values: int, points: int) -> int:
     return min(_SEEDS, key=largest_correlation)
 
 
+def plan_spread(
+    case: Case,
+    out: Path,
+    options: SweepOptions,
+    *,
+    points: int = POINTS,
+    engine: str | None = None,
+) -> SweepPlan:
+    """Plan the draws of the spread of a case; nothing is written.
+
+    The arguments and the errors are those of `run_spread`.
+    """
+    return plan_sweep(spread_sweep(case, points, engine), out, _options_of_draws(options), engine)
+
+
+def _options_of_draws(options: SweepOptions) -> SweepOptions:
+    """Options of a sweep for the draws of a spread."""
+    return replace(options, dumps=False, own_runs=True)
+
+
 def run_spread(  # noqa: PLR0913
     case: Case,
     out: Path,
@@ -256,7 +276,8 @@ def run_spread(  # noqa: PLR0913
     out
         Folder of the run directories.
     options
-        How the runs are made. They keep no dumps, which only pictures need.
+        How the runs are made. They keep no dumps, which only pictures need, and are made in the
+        directory of the spread.
     points
         Number of draws, see `spread_sweep`.
     engine, on_progress
@@ -279,9 +300,13 @@ def run_spread(  # noqa: PLR0913
     Values are drawn independently. Calibrated values are correlated
     (docs/explanation/calibration.md): for them, the band is wider than that of the posterior.
     """
-    options = replace(options, dumps=False)
-    draws = spread_sweep(case, points, engine)
-    record, failures = run_sweep(draws, out, options, engine=engine, on_progress=on_progress)
+    record, failures = run_sweep(
+        spread_sweep(case, points, engine),
+        out,
+        _options_of_draws(options),
+        engine=engine,
+        on_progress=on_progress,
+    )
     table = table_of(record)
     doubts = [result.warnings for result in table.results.values() if result.warnings]
     spread = spread_in(table.frame, case, record.directory, failures)
