@@ -84,6 +84,7 @@ from walkers.sweeps.spread import (
 )
 from walkers.sweeps.table import SweepTable, aligned_table, describe_status, table_of
 from walkers.sweeps.workers import Failure
+from walkers.terminal import table_width
 from walkers.warning import warn_user
 
 if TYPE_CHECKING:
@@ -382,11 +383,17 @@ class Run:
         """
         return read_table(self.finished_directory, name)
 
-    def describe(self) -> str:
-        """The result as text in mm, mm/s and degrees; of an unfinished run, its progress."""
+    def describe(self, *, verbose: bool = False) -> str:
+        """The result as text in mm, mm/s and degrees; of an unfinished run, its progress.
+
+        Parameters
+        ----------
+        verbose
+            Whether to write all numbers, and all values that have not been measured.
+        """
         if not run_directory.is_finished(self.directory):
             return f"{self.directory.name}: {self._state}"
-        return result_text(self.result, cached=self.cached)
+        return result_text(self.result, cached=self.cached, verbose=verbose)
 
     def _repr_html_(self) -> str:
         """The result in a notebook: a table with errors, units and warnings, and the parameters."""
@@ -809,6 +816,7 @@ def run(
     binary = find_engine(engine)
     place = run_directory.run_place(requested, binary, folder)
     if run_directory.is_finished(place) and not force:
+        run_directory.mark_as_requested(place)
         return _measured(Run(place, requested=requested))
     check_audit(binary)
     with progress_of(requested.name, progress) as advance:
@@ -817,6 +825,7 @@ def run(
         )
     if not runs:
         raise RunBusy("another process is still running this case", run_directory.unfinished(place))
+    run_directory.mark_as_requested(place)
     return Run(place, cached=not runs[place.name], requested=requested)
 
 
@@ -931,8 +940,8 @@ class Sweep:
 
     def describe(self) -> str:
         """The status of the points, their failures, and the table in mm, mm/s, nJ and degrees."""
-        frame = self._table.frame
-        return f"{describe_status(frame)}\n\n{aligned_table(frame.drop(columns='run'))}"
+        frame = self._table.frame.drop(columns="run")
+        return f"{describe_status(frame)}\n\n{aligned_table(frame, table_width())}"
 
     def _repr_html_(self) -> str:
         """The table in a notebook."""

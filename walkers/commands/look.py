@@ -24,6 +24,7 @@ from walkers.commands.options import (
 from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.postprocess.show.film_options import FilmOptions, Seconds
 from walkers.sweeps.figure_options import FigureOptions
+from walkers.terminal import table_width
 
 
 def list_(
@@ -32,7 +33,7 @@ def list_(
     *,
     out: OutOption = DEFAULT_OUT,
     every: Annotated[bool, Parameter("--all")] = False,
-    where: Annotated[list[str] | None, Parameter(metavar="KEY=VALUE")] = None,
+    where: Annotated[list[str] | None, Parameter(metavar="CONDITION")] = None,
     to: Path | None = None,
     units: UnitSystem | None = None,
     as_json: JsonOption = False,
@@ -44,9 +45,10 @@ def list_(
     sweep
         A sweep (name or folder): print the status of its points and its table.
     every
-        Include the runs of sweeps.
+        Include the runs of sweeps, spreads and accuracies.
     where
-        Only runs with this value, such as "drive.frequency=80 Hz". Repeatable.
+        Only runs with this value or result, such as "drive.frequency=80 Hz" or "velocity>1mm/s".
+        Repeatable.
     to
         Write the table of the sweep, with units, to this file (.csv, .parquet, .json).
     units
@@ -66,10 +68,14 @@ def list_(
     shown = entries if every else listing.without_members(entries)
     hidden = len(entries) - len(shown)
     if where:
-        runs = [entry for entry in entries if entry.kind == "run"]
-        shown = select(runs, where)
+        searched = entries if every else listing.without_draws(entries)
+        shown = select([entry for entry in searched if entry.kind == "run"], where)
         hidden = 0
-    print_as(as_json, lambda: listing.as_json(shown), lambda: listing.listing_text(shown, hidden))
+    print_as(
+        as_json,
+        lambda: listing.as_json(shown),
+        lambda: listing.listing_text(shown, hidden, table_width()),
+    )
 
 
 def _list_points(name: str, out: Path, to: Path | None, units: UnitSystem, as_json: bool) -> None:

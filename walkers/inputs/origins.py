@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-from walkers.inputs.units import QuantityKind, quantity_text
+from walkers.inputs.units import QuantityKind, as_quantity, quantity_text
 
 SourceKind = Literal[
     "given", "library", "own library", "calibrated", "assumed", "default", "derived"
@@ -93,6 +93,16 @@ class Origin:
         if self.uncertain:
             return f"{self.origin}, uncertain"
         return self.origin
+
+
+def accelerations_in_g(origins: Iterable[Origin]) -> bool:
+    """Whether a case gives the acceleration of its drive in g, not in m/s²."""
+    for origin in origins:
+        quantity = as_quantity(origin.text)
+        is_acceleration = origin.key.endswith("acceleration")
+        if is_acceleration and quantity is not None and quantity[1] == "g":
+            return True
+    return False
 
 
 def text_of(value: Any, kind: QuantityKind | None = None) -> str:

@@ -67,6 +67,7 @@ def _usual_units() -> dict[str, tuple[str, float]]:
     for unit in _PREFIXED:
         for prefix, factor in _PREFIXES.items():
             units[f"{prefix}{unit}"] = (unit, factor)
+            units[f"{prefix}{unit.replace('*', ' ')}"] = (unit, factor)
     return units
 
 
@@ -74,6 +75,15 @@ _USUAL: Mapping[str, tuple[str, float]] = _usual_units()
 """Usual units; a case with only these units does not import pint, which takes time."""
 _ZEROS: Mapping[str, float] = {"K": 0.0, "degC": 273.15, "°C": 273.15}
 """Zero points of temperature units, K."""
+
+
+_SYMBOLS: Mapping[re.Pattern[str], str] = {
+    re.compile(r"(?<=\d )u(?=(m|s|N|g|J)\b)"): "µ",
+    re.compile(r"(?<=[a-z])\^2\b"): "²",
+    re.compile(r"(?<=[a-z])\^3\b"): "³",
+    re.compile(r"(?<=Pa)\*(?=s\b)"): " ",
+}
+"""What stands for symbols in case files, and the symbols (`with_symbols`)."""
 
 
 @dataclass(frozen=True)
@@ -310,6 +320,19 @@ def quantity_text(value: float, kind: QuantityKind) -> str:
     zero = _ZEROS.get(unit, 0.0)
     _, factor = _USUAL.get(unit, ("", 1.0))
     return f"{(value - zero) / factor:.6g} {unit}"
+
+
+def with_symbols(text: str) -> str:
+    """Quantities as a physicist writes them, for people; `parse_quantity` reads both forms.
+
+    Examples
+    --------
+    >>> with_symbols("70 um, 0.92 g/cm^3, 4.6 mPa*s, 9.8 m/s^2")
+    '70 µm, 0.92 g/cm³, 4.6 mPa s, 9.8 m/s²'
+    """
+    for written, symbol in _SYMBOLS.items():
+        text = written.sub(symbol, text)
+    return text
 
 
 def kind_in(annotations: Iterable[Any]) -> QuantityKind | None:

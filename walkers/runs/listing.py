@@ -28,13 +28,14 @@ from walkers.runs.case_text import (
     FlatCase,
     differing,
     flattened,
-    has_value,
     readable,
     short_keys,
 )
+from walkers.runs.conditions import Condition
 from walkers.runs.making import progress_at
 from walkers.runs.status import state_at
-from walkers.text import aligned
+from walkers.inputs.units import with_symbols
+from walkers.text import fitted_table
 
 _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 """Bytes in the units of sizes, the largest first."""
@@ -75,6 +76,10 @@ class ListEntry:
         Names of the runs of a sweep.
     parameters
         Values of the case (`flattened`); of a sweep, the number of values of each varied key.
+    title
+        What a sweep is about; empty for a run.
+    requested
+        Whether a run was asked for by itself, not only as a point of a sweep.
     """
 
     kind: str
@@ -92,6 +97,8 @@ class ListEntry:
     points: Mapping[str, int] | None = None
     runs: Sequence[str] | None = None
     parameters: FlatCase = field(default_factory=FlatCase)
+    title: str = ""
+    requested: bool = False
 
     @property
     def age_and_size(self) -> list[str]:
@@ -243,6 +250,7 @@ def _finished(path: Path, case: str, parameters: FlatCase) -> ListEntry:
         result=text,
         numbers=numbers,
         parameters=parameters,
+        requested=run_directory.is_requested(path),
     )
 
 
@@ -321,30 +329,35 @@ def bytes_text(size: int) -> str:
 
 
 def select(runs: Sequence[ListEntry], where: Iterable[str]) -> list[ListEntry]:
-    """The runs that have all values (`has_value`).
+    """The runs that meet all conditions (`walkers.runs.conditions.Condition`).
 
     Raises
     ------
     InputError
-        If a condition cannot be read, or no run has its key.
+        If a condition cannot be read, or no run has its key or number.
     """
     selected = list(runs)
-    for condition in where:
-        answers = [has_value(run.parameters, condition) for run in selected]
+    for text in where:
+        condition = Condition.read(text)
+        answers = [condition.holds(run.parameters, run.numbers) for run in selected]
         if selected and all(answer is None for answer in answers):
             raise _no_such_key(condition, selected)
         selected = [run for run, answer in zip(selected, answers, strict=True) if answer]
     return selected
 
 
-def _no_such_key(condition: str, runs: Sequence[ListEntry]) -> InputError:
-    """The error for a condition whose key no run has, with the keys that runs have."""
+def _no_such_key(condition: Condition, runs: Sequence[ListEntry]) -> InputError:
+    """The error for a condition whose key no run has, with the keys and numbers that runs have."""
     keys: set[str] = set()
+    numbers: set[str] = set()
     for run in runs:
         keys.update(run.parameters)
+        numbers.update(run.numbers or ())
     names = short_keys(sorted(keys))
-    near = suggestion(condition.partition("=")[0].strip(), names)
-    text = f'"{condition}": no run has such a key{near}; runs have {", ".join(names)}'
+    near = suggestion(condition.key, [*names, *sorted(numbers)])
+    text = f'"{condition.text}": no run has such a key{near}; runs have {", ".join(names)}'
+    if numbers:
+        text += ", and the numbers of their results, such as velocity"
     return input_error("where", text)
 
 
@@ -367,17 +380,20 @@ class RunsOfCase:
     runs: Sequence[ListEntry]
     keys: Sequence[str]
 
-    def as_text(self) -> str:
-        """A line for each run, with a column for each key by which the runs differ."""
+    def as_text(self, width: int | None = None) -> str:
+        """A line for each run, with a column for each key by which the runs differ.
+
+        If the columns are wider than ``width``, the values stand below each run.
+        """
         heads = [f"{self.case} ({len(self.runs)})", "status", "result", "age", "size"]
         lines = [[*heads, *short_keys(self.keys)]]
         for run in self.runs:
             status = run.status
             if run.reason:
                 status = f"{run.status}: {run.reason}"
-            values = [readable(key, run.parameters.get(key)) for key in self.keys]
+            values = [with_symbols(readable(key, run.parameters.get(key))) for key in self.keys]
             lines.append([run.name, status, run.result, *run.age_and_size, *values])
-        return aligned(lines)
+        return fitted_table(lines, len(heads), width, styled_column=1)
 
 
 def by_case(runs: Sequence[ListEntry]) -> list[RunsOfCase]:

@@ -23,7 +23,7 @@ from walkers.inputs.messages import attributed_to
 from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import SweepDefinition, expand
 from walkers.inputs.tables.case import Case
-from walkers.inputs.units import parse_quantity, unit_factor
+from walkers.inputs.units import parse_quantity, unit_factor, with_symbols
 from walkers.postprocess.measure.numbers import MAIN_NUMBERS
 from walkers.postprocess.measure.quantities import declared, unit_shown
 from walkers.postprocess.measure.sides import REST
@@ -473,20 +473,20 @@ def spread_text(spread: Spread) -> str:
     points = 0
     for band in spread.bands.values():
         points = max(points, int(band["points"]))
-    lines = [
+    lines = wrapped_lines(
         f"  spread     {points} draws; values drawn independently from their ranges, "
         "half of them at or below the value of the case"
-    ]
+    )
     for value in spread.varied:
         ends = " to ".join(map(str, value.range or ()))
-        lines.append(f"{_INDENT}{value.key} {value.text} ({ends})")
+        lines.append(with_symbols(f"{_INDENT}{value.key} {value.text} ({ends})"))
     lines += wrapped_lines(f"    fixed    {fixed_values_text(spread.held)}")
     for name, band in spread.bands.items():
-        lines.append(f"    {declared(name).label:8} {_band_text(name, band)}")
-        lines.append(f"{_INDENT}{_dependence_text(spread, name)}")
+        lines += wrapped_lines(f"    {declared(name).label:8} {_band_text(name, band)}")
+        lines += wrapped_lines(f"{_INDENT}{_dependence_text(spread, name)}")
     outcomes = _outcomes_text(spread)
     if outcomes:
-        lines.append(f"    draws    {outcomes}")
+        lines += wrapped_lines(f"    draws    {outcomes}")
     if spread.doubts:
         draws = counted(len(spread.doubts), "draw")
         lines += wrapped_lines(f"    warning  {draws} with warnings, first: {spread.doubts[0][0]}")

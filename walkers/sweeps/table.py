@@ -49,7 +49,8 @@ from walkers.runner.run_directory import case_of
 from walkers.runs.case_text import short_keys
 from walkers.runs.status import PointState, status_text
 from walkers.sweeps.record import SweepRecord, read_sweep_record, states
-from walkers.text import aligned, with_unit
+from walkers.terminal import HEADING, styled, wrapped
+from walkers.text import aligned_blocks, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -564,12 +565,22 @@ def _cell(value: Any, factor: float, unit: str) -> str:
     return rounded(value * factor, unit)
 
 
-def aligned_table(frame: pd.DataFrame) -> str:
-    """The `cells_of` a table, with a line below for the results that are the same at all points."""
+def aligned_table(frame: pd.DataFrame, width: int | None = None) -> str:
+    """The `cells_of` a table, with a line below for the results that are the same at all points.
+
+    A table that is wider than ``width`` is split; its parts begin with the varied keys.
+    """
     cells, same = cells_of(frame)
-    text = aligned([[*cells], *cells.to_numpy().tolist()], right=range(len(cells.columns)))
+    heads = [styled(head, HEADING) for head in cells]
+    keys = len(frame.attrs["varied"])
+    if "point" in frame:
+        keys += 1
+    text = aligned_blocks(
+        [heads, *cells.to_numpy().tolist()], width, repeated=keys, right=range(len(heads))
+    )
     if same:
-        text += f"\n\nthe same at all points: {same}"
+        same_lines = wrapped(f"the same at all points: {same}", width=width)
+        text += "\n\n" + "\n".join(same_lines)
     return text
 
 
