@@ -8,6 +8,7 @@ of a run.
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -99,7 +100,7 @@ __all__ = [
     "sweep",
 ]
 
-DEFAULT_OUT = Path("runs")
+DEFAULT_OUT = Path(os.environ.get("WALKERS_RUNS") or "runs")
 """Folder of runs and sweeps, unless the user names another one."""
 RECORDS = {"run": "manifest.json", "sweep": "sweep.json", "calibration": "calibration.json"}
 """Files that identify directories; named here to avoid imports."""

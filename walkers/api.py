@@ -730,7 +730,7 @@ def check_export(form: str, options: Sequence[str] = ()) -> None:
         if option not in _OPTIONS_OF_FORMS[form]:
             forms = [name for name, taken in _OPTIONS_OF_FORMS.items() if option in taken]
             names = ", ".join(forms)
-            raise input_error(option, f"is for the form {names}", f"is for --to {names}")
+            raise input_error(option, f"is for the form {names}", f"is for --format {names}")
 
 
 def _path(to: str | Path | None) -> Path | None:

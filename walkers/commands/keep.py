@@ -57,8 +57,8 @@ def export(
     name: RunOrSweepArgument,
     /,
     *,
-    form: Annotated[Export, Parameter("--to")],
-    to: Annotated[Path | None, Parameter("-o", metavar="PATH")] = None,
+    form: Annotated[Export, Parameter("--format", metavar="FORMAT")],
+    to: Annotated[Path | None, Parameter(("--to", "-o"))] = None,
     lookup: LookupOptions = LookupOptions(),
     options: ExportOptions = ExportOptions(),
 ) -> None:

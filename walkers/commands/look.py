@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import webbrowser
 from pathlib import Path
 from typing import Annotated
 
@@ -14,12 +15,14 @@ from walkers.commands.options import (
     JsonOption,
     LookupOptions,
     OutOption,
+    QuietOption,
     RunArgument,
     RunOrSweepArgument,
     print_as,
     print_lines,
     refuse,
     refuse_any,
+    tell,
 )
 from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.postprocess.show.film_options import FilmOptions, Seconds
@@ -92,7 +95,7 @@ def _list_points(name: str, out: Path, to: Path | None, units: UnitSystem, as_js
     refuse(
         name,
         kind != "sweep",
-        f"not a sweep: expected a folder with a sweep.json (walkers list --out {name}?)",
+        f"not a sweep: expected a folder with a sweep.json (walkers list --runs {name}?)",
     )
     sweep = Sweep(reference.path)
     if to is not None:
@@ -120,7 +123,7 @@ def plot(
     Parameters
     ----------
     to
-        Runs: folder of the figures. Sweeps: file to write (.png, .pdf, .svg).
+        Runs: folder to write the figures to. Sweeps: file to write (.png, .pdf, .svg).
     """
     loaded = lookup.load(name)
     if isinstance(loaded, walkers.Run):
@@ -140,6 +143,7 @@ def render(
     images: int | None = None,
     film: bool = False,
     options: FilmOptions = FilmOptions(),
+    quiet: QuietOption = False,
 ) -> None:
     """Render pictures of a run at several times, or a film with --film.
 
@@ -154,7 +158,7 @@ def render(
     """
     if film:
         refuse("--images", images is not None, "is for pictures, not for --film")
-        print(lookup.run(run).film(to, progress=True, **vars(options)))
+        print(lookup.run(run).film(to, progress=not quiet, **vars(options)))
         return
     defaults = vars(FilmOptions(walker=options.walker))
     changed = {name: value != defaults[name] for name, value in vars(options).items()}
@@ -164,7 +168,12 @@ def render(
 
 
 def report(
-    name: RunOrSweepArgument, /, *, lookup: LookupOptions = LookupOptions(), to: Path | None = None
+    name: RunOrSweepArgument,
+    /,
+    *,
+    lookup: LookupOptions = LookupOptions(),
+    to: Path | None = None,
+    opened: Annotated[bool, Parameter("--open")] = False,
 ) -> None:
     """Write a self-contained HTML report: parameters, results, plots and a 3-D view of the motion.
 
@@ -172,8 +181,13 @@ def report(
     ----------
     to
         HTML file to write; default: report.html in the folder of the run or sweep.
+    opened
+        Also open the report in a browser.
     """
-    print(lookup.load(name).report(to))
+    path = lookup.load(name).report(to)
+    print(path)
+    if opened and not webbrowser.open(path.resolve().as_uri()):
+        tell(f"no browser was found; open {path} yourself")
 
 
 def compare(
@@ -200,7 +214,9 @@ def compare(
 
 
 def climb(
-    *names: Annotated[RunOrSweepArgument, Parameter(help="Sweeps, runs or cases of piles.")],
+    *names: Annotated[
+        RunOrSweepArgument, Parameter(required=True, help="Sweeps, runs or cases of piles.")
+    ],
     lookup: LookupOptions = LookupOptions(),
     within: Seconds | None = None,
     to: Path | None = None,
@@ -219,7 +235,6 @@ def climb(
     """
     from walkers.sweeps.climbing_output import describe_climbs
 
-    refuse("RUN|SWEEP", not names, "expected sweeps, runs or cases of piles")
     references = [lookup.find(name) for name in names]
     climbs = walkers.climb(references, within=within, to=to)
     print_as(as_json, lambda: climbs, lambda: describe_climbs(climbs))

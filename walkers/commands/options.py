@@ -8,7 +8,9 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -28,7 +30,7 @@ if TYPE_CHECKING:
 
 
 def _completions(context: CompletionContext) -> list[str]:
-    """Names that a shell completes: case files, shipped cases, runs and sweeps in ``--out``."""
+    """Names that a shell completes: case files, shipped cases, runs and sweeps in ``--runs``."""
     from walkers.inputs.reading import shipped
 
     out = Path(context["out"].raw or DEFAULT_OUT)
@@ -51,7 +53,7 @@ AT_LEAST_1 = Number(gte=1)
 NOT_NEGATIVE = Number(gte=0)
 """Validator of a time limit, s."""
 _CASE = "A case file, the name of a shipped case such as fig1b, or a run (name or folder)."
-_RUN = "its folder, its name in --out, or its case (file or name)."
+_RUN = "its folder, its name in --runs, or its case (file or name)."
 
 CaseArgument = Annotated[str, Parameter(name="CASE", completer=_completions, help=_CASE)]
 RunArgument = Annotated[str, Parameter(name="RUN", completer=_completions, help=f"A run: {_RUN}")]
@@ -60,7 +62,14 @@ RunOrSweepArgument = Annotated[
 ]
 OutOption = Annotated[
     Path,
-    Parameter(validator=PathValidator(file_okay=False), help="Folder that contains the runs."),
+    Parameter(
+        ("--runs", "--out"),
+        validator=PathValidator(file_okay=False),
+        help="Folder that contains the runs; WALKERS_RUNS in the environment sets its default.",
+    ),
+]
+QuietOption = Annotated[
+    bool, Parameter(("--quiet", "-q"), help="Print only results and errors, no progress.")
 ]
 JobsOption = Annotated[
     int | None,
@@ -101,12 +110,16 @@ class LookupOptions:
 
         return settings_of(self.changes or ())
 
-    def find(self, name: str) -> Reference:
-        """What a name means; keys that ``--set`` replaces by others are told on standard error."""
+    def find(self, name: str, *, quiet: bool = False) -> Reference:
+        """What a name means.
+
+        Keys that ``--set`` replaces by others are told on standard error, unless ``quiet``.
+        """
         from walkers.runs.names import find
 
         reference = find(name, self.out, self.values)
-        tell_replaced(reference.replaced)
+        if not quiet:
+            tell_replaced(reference.replaced)
         return reference
 
     def load(self, name: str) -> Run | Sweep:
@@ -171,6 +184,15 @@ def tell_replaced(replaced: Mapping[str, Sequence[str]]) -> None:
     """
     for key, former in replaced.items():
         tell(f"{key} replaces {', '.join(former)} of the case")
+
+
+@contextmanager
+def warnings_shown(shown: bool) -> Iterator[None]:
+    """Show the warnings of a ``with`` block, or leave them out."""
+    with warnings.catch_warnings():
+        if not shown:
+            warnings.simplefilter("ignore")
+        yield
 
 
 def tell(*messages: str) -> None:

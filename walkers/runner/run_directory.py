@@ -607,7 +607,7 @@ def _lock(file: Path, deadline: float) -> int | None:
             file.unlink(missing_ok=True)
             message = (
                 f"files cannot be locked ({error.strerror}): expected a folder on a file system "
-                "with locks (flock); choose another one with --out, or out= in Python"
+                "with locks (flock); choose another one with --runs, or out= in Python"
             )
             raise input_error(file.parent, message) from error
         os.close(descriptor)

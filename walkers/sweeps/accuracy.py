@@ -27,7 +27,7 @@ from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME
 from walkers.progress import Tell
 from walkers.runner.binary import find_engine
 from walkers.runner.run_directory import case_of, recomputed, run_place
-from walkers.sweeps.scheduler import SweepOptions, run_sweep
+from walkers.sweeps.scheduler import SweepOptions, SweepPlan, plan_sweep, run_sweep
 from walkers.sweeps.table import SIDES, main_columns, sides_differ, table_of
 from walkers.sweeps.workers import SweepStopped
 
@@ -39,6 +39,8 @@ SHARE = 0.01
 _MODULUS_FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0)
 """Young's moduli, divided by the modulus of the case; with the largest, a run takes 16 times as
 long."""
+_FIRST_FACTORS = 3
+"""Number of the factors that are tried in any case, if the case allows them."""
 _LEAST_INCREASE = 1.25
 """Smallest factor of a last increase of the modulus, to the largest one of a case."""
 _FAMILIES = (
@@ -99,7 +101,7 @@ def measure_accuracy(
     options = replace(options, own_runs=True)
     numbers = recorded(directory)["numbers"]
     # The modulus is increased at least twice if the case allows it, and further only if necessary.
-    for last in range(min(2, len(possible) - 1), len(possible)):
+    for last in range(min(_FIRST_FACTORS, len(possible)) - 1, len(possible)):
         sweep = _convergence_sweep(case, f"{directory.name}{ACCURACY}", possible[: last + 1])
         record, failures = run_sweep(
             sweep, directory.parent, options, engine=engine, on_progress=on_progress
@@ -124,6 +126,27 @@ def measure_accuracy(
     with recomputed(directory, [ACCURACY_NAME]):
         write_json(directory / ACCURACY_NAME, accuracy)
     return accuracy
+
+
+def plan_accuracy(
+    case: Case, directory: Path, options: SweepOptions, engine: str | None = None
+) -> SweepPlan:
+    """Plan the first runs that measure the numerical errors of a run; nothing is written.
+
+    More follow if the velocities still change then.
+
+    Parameters
+    ----------
+    case
+        The case of the run.
+    directory
+        The final directory of the run, which need not exist.
+    options, engine
+        As for `measure_accuracy`.
+    """
+    factors = modulus_factors(case)[:_FIRST_FACTORS]
+    sweep = _convergence_sweep(case, f"{directory.name}{ACCURACY}", factors)
+    return plan_sweep(sweep, directory.parent, replace(options, own_runs=True), engine)
 
 
 def _check_is_current(case: Case, directory: Path, engine: str | None) -> None:
