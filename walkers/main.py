@@ -190,6 +190,8 @@ class _PlainHelp:
         self.before_panels: list[str] = []
 
     def __call__(self, _console: object, _options: object, panel: HelpPanel) -> None:
+        if not panel.entries:
+            return
         if self.before_panels:
             usage, *others = self.before_panels
             self.before_panels = []

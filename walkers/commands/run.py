@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 import walkers
+from walkers.api import case_to_run, finished_run_of
 from walkers.commands.options import (
     NOT_NEGATIVE,
     CaseArgument,
@@ -25,7 +26,6 @@ from walkers.commands.options import (
     tell_replaced,
     warnings_shown,
 )
-from walkers.api import case_to_run, finished_run_of
 from walkers.errors import apply_all
 from walkers.progress import progress_of
 from walkers.rounding import counted, duration_text

@@ -19,6 +19,7 @@ from walkers.errors import InputError, input_error, suggestion
 from walkers.files import read_json
 from walkers.inputs.case_building import stored_case
 from walkers.inputs.tables.case import Case
+from walkers.inputs.units import with_symbols
 from walkers.postprocess.measure.numbers import headline, short_text
 from walkers.postprocess.measure.results import Results, json_numbers, read_results
 from walkers.rounding import duration_text
@@ -34,7 +35,6 @@ from walkers.runs.case_text import (
 from walkers.runs.conditions import Condition
 from walkers.runs.making import progress_at
 from walkers.runs.status import state_at
-from walkers.inputs.units import with_symbols
 from walkers.text import fitted_table
 
 _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}

@@ -218,10 +218,8 @@ def _meanings(path: Path, out: Path, *, is_shipped: bool) -> Iterator[tuple[Name
             yield "run", complete
         if run_directory.is_deck_folder(place) and not is_shipped:
             yield "deck", place
-    if run_directory.is_run_name(path.name):
-        for place in out.glob(f"*/{escape(path.name)}"):  # a draw of a spread, by its name alone
-            if (place.parent / RECORDS["sweep"]).is_file() and run_directory.is_finished(place):
-                yield "run", place
+    for place in _draws_named(path.name, out):
+        yield "run", place
     sweep = out / path.stem
     if (sweep / RECORDS["sweep"]).is_file() and is_sweep_file(path):
         yield "sweep", sweep
@@ -230,6 +228,17 @@ def _meanings(path: Path, out: Path, *, is_shipped: bool) -> Iterator[tuple[Name
     if path.is_dir() and not is_shipped:
         yield "folder", path
     yield "case", path
+
+
+def _draws_named(name: str, out: Path) -> list[Path]:
+    """Finished runs of a name in the directories of spreads and accuracies."""
+    if not run_directory.is_run_name(name):
+        return []
+    draws = []
+    for place in out.glob(f"*/{escape(name)}"):
+        if (place.parent / RECORDS["sweep"]).is_file() and run_directory.is_finished(place):
+            draws.append(place)
+    return draws
 
 
 def is_begun(place: Path) -> bool:

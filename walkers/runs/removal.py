@@ -157,7 +157,7 @@ def remove(removals: Sequence[Removal]) -> dict[Path, str]:
     dict
         Paths that are left, with the reason: a run in progress, or an error of the system.
     """
-    left = {}
+    left: dict[Path, str] = {}
     # The directory of a sweep may contain runs.
     runs_first = sorted(removals, key=lambda removal: removal.kind is RemovalKind.SWEEP)
     for removal in runs_first:

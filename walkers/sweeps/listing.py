@@ -135,9 +135,7 @@ def as_json(contents: Sequence[ListEntry]) -> list[dict[str, Any]]:
     return rows
 
 
-def listing_text(
-    contents: Sequence[ListEntry], hidden: int = 0, width: int | None = None
-) -> str:
+def listing_text(contents: Sequence[ListEntry], hidden: int = 0, width: int | None = None) -> str:
     """Entries as text: sweeps, then the runs of each case; velocities in mm/s.
 
     Spreads and accuracies are named by the condition of their run.

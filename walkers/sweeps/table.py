@@ -571,7 +571,7 @@ def aligned_table(frame: pd.DataFrame, width: int | None = None) -> str:
     A table that is wider than ``width`` is split; its parts begin with the varied keys.
     """
     cells, same = cells_of(frame)
-    heads = [styled(head, HEADING) for head in cells]
+    heads = [styled(str(head), HEADING) for head in cells]
     keys = len(frame.attrs["varied"])
     if "point" in frame:
         keys += 1

@@ -22,9 +22,9 @@ from walkers.inputs.resolving.loads import softness_warning
 from walkers.inputs.resolving.plausibility import implausible
 from walkers.postprocess.measure import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.measure.caption import conditions
+from walkers.postprocess.measure.in_words import motion_in_words
 from walkers.postprocess.measure.measuring_module import MeasuringModule
 from walkers.postprocess.measure.motion import Motion, read_motion
-from walkers.postprocess.measure.in_words import motion_in_words
 from walkers.postprocess.measure.numbers import (
     MAIN_NUMBERS,
     Row,
@@ -51,7 +51,6 @@ from walkers.runner.run_directory import (
     recomputed,
     segment_directories,
 )
-
 from walkers.terminal import ASIDE, HEADING, WARNING, styled, text_width, wrapped, wrapped_after
 
 if TYPE_CHECKING:
