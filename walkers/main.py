@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from walkers.commands import ALL_COMMANDS
 from walkers.errors import InputError, WalkersError, shortened
-from walkers.terminal import ERROR, HEADING, WARNING, styled
+from walkers.terminal import ERROR, HEADING, WARNING, message_text, styled
 from walkers.text import printable
 
 if TYPE_CHECKING:
@@ -109,8 +109,7 @@ def main(arguments: list[str] | None = None, app: App | None = None) -> NoReturn
 
 def _show_warning(message: object, *_position: object, **_options: object) -> None:
     """Print a warning as the program prints messages."""
-    word = styled("warning:", WARNING, sys.stderr)
-    print(f"walkers: {word} {message}", file=sys.stderr)
+    _print_message("walkers: warning:", str(message), WARNING)
 
 
 def _prepare_streams() -> None:
@@ -411,8 +410,14 @@ def _options_of(names: str, tokens: list[str], app: App) -> str:
 
 def _tell(message: str, status: int) -> int:
     """Print a message, and return the status."""
-    print(f"{styled('walkers:', ERROR, sys.stderr)} {message}", file=sys.stderr)
+    _print_message("walkers:", message, ERROR)
     return status
+
+
+def _print_message(head: str, message: str, style: str) -> None:
+    """Print a message on standard error; its head has a style on a terminal."""
+    text = message_text(f"{head} {message}", sys.stderr)
+    print(styled(head, style, sys.stderr) + text[len(head) :], file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -90,6 +90,13 @@ def wrapped_after(head: str, text: str, style: str, indent: str = "") -> list[st
     return [styled(head, style) + first[len(head) :], *rest]
 
 
+def message_text(text: str, stream: TextIO) -> str:
+    """A message that fits the terminal; a single line elsewhere, in which programs find it."""
+    if not stream.isatty():
+        return text
+    return "\n".join(wrapped(text, "    ", text_width()))
+
+
 def visible_length(text: str) -> int:
     """Number of characters of a text that are seen, without colours."""
     return len(_ESCAPES.sub("", text))

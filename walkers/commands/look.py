@@ -192,7 +192,7 @@ def report(
 
 def compare(
     first: RunOrSweepArgument,
-    second: Annotated[str | None, Parameter(name="RUN")] = None,
+    second: Annotated[str | None, Parameter(name="OTHER")] = None,
     /,
     *,
     lookup: LookupOptions = LookupOptions(),

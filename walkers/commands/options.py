@@ -21,6 +21,7 @@ from cyclopts.validators import Path as PathValidator
 
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import input_error
+from walkers.terminal import message_text
 
 if TYPE_CHECKING:
     from cyclopts.completion import CompletionContext
@@ -198,4 +199,4 @@ def warnings_shown(shown: bool) -> Iterator[None]:
 def tell(*messages: str) -> None:
     """Print messages on standard error, a line each."""
     for message in messages:
-        print(f"walkers: {message}", file=sys.stderr, flush=True)
+        print(message_text(f"walkers: {message}", sys.stderr), file=sys.stderr, flush=True)

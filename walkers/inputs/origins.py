@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
@@ -95,12 +95,14 @@ class Origin:
         return self.origin
 
 
-def accelerations_in_g(origins: Iterable[Origin]) -> bool:
-    """Whether a case gives the acceleration of its drive in g, not in m/s²."""
-    for origin in origins:
-        quantity = as_quantity(origin.text)
-        is_acceleration = origin.key.endswith("acceleration")
-        if is_acceleration and quantity is not None and quantity[1] == "g":
+def accelerations_in_g(texts: Mapping[str, str]) -> bool:
+    """Whether a case gives the acceleration of its drive in g, not in m/s².
+
+    ``texts`` are the values of the case as text, by their keys.
+    """
+    for key, text in texts.items():
+        quantity = as_quantity(text)
+        if key.endswith("acceleration") and quantity is not None and quantity[1] == "g":
             return True
     return False
 

@@ -39,7 +39,8 @@ def conditions(case: Case, *, in_given_unit: bool = False) -> str:
     An example is ``…, plane tilted by 90°, right is up``. Pictures have the drive axis to the
     right: what faces right goes up where that is the steepest way up.
     """
-    in_g = in_given_unit and accelerations_in_g(case.origins)
+    texts = {origin.key: origin.text for origin in case.origins}
+    in_g = in_given_unit and accelerations_in_g(texts)
     drive: str = case.excitation.described(in_g=in_g)
     tilt = case.boundary.tilted
     if not tilt:
