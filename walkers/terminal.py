@@ -12,6 +12,7 @@ import re
 import shutil
 import sys
 import textwrap
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import TextIO
 
@@ -82,6 +83,15 @@ def wrapped(text: str, indent: str = "", width: int | None = None) -> list[str]:
         break_on_hyphens=False,
         break_long_words=False,
     )
+
+
+def fitted_lines(lines: Iterable[str]) -> str:
+    """Lines that are wrapped on a terminal; in a pipe each remains one line."""
+    width = table_width()
+    fitted: list[str] = []
+    for line in lines:
+        fitted += [line] if width is None else wrapped(line, "    ", width)
+    return "\n".join(fitted)
 
 
 def wrapped_after(head: str, text: str, style: str, indent: str = "") -> list[str]:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 _ITEM_INDENT = " " * 4
 """Start of the lines of `wrapped_items`."""
+_LEAST_TEXT_WIDTH = 24
+"""Smallest width of a column of running text, characters."""
 _UNBROKEN = "\u2060"
 """Stands for a space at which lines are not broken; no text contains this invisible letter."""
 
@@ -147,6 +149,41 @@ def fitted_table(
     return "\n".join(lines)
 
 
+def aligned_with_text(rows: Sequence[Sequence[str]], width: int | None = None) -> str:
+    """Rows of cells as an `aligned` table whose last column is running text.
+
+    Parameters
+    ----------
+    rows
+        Texts of the cells.
+    width
+        Width to which the last column is wrapped, characters; None: any. If little of it is left,
+        the texts stand in indented lines below the other cells; a table whose other cells are wider
+        is split (`aligned_blocks`).
+    """
+    first_lines = aligned([row[:-1] for row in rows]).split("\n")
+    if width is None:
+        return aligned(rows)
+    margin = max(map(visible_length, first_lines)) + 2
+    if margin - 2 > width:
+        return aligned_blocks(rows, width)
+    is_below = width - margin < _LEAST_TEXT_WIDTH
+    lines = []
+    for line, row in zip(first_lines, rows, strict=True):
+        text = row[-1]
+        if is_below:
+            lines.append(line)
+            lines += wrapped(_ITEM_INDENT + text, _ITEM_INDENT, width) if text else []
+        elif text:
+            space = " " * (margin - visible_length(line))
+            first, *rest = wrapped(text, width=width - margin)
+            lines.append(line + space + first)
+            lines += [" " * margin + part for part in rest]
+        else:
+            lines.append(line)
+    return "\n".join(lines)
+
+
 def aligned_blocks(
     rows: Sequence[Sequence[str]],
     width: int | None = None,
@@ -176,6 +213,8 @@ def aligned_blocks(
     space_of_repeated = sum(widths[:repeated]) + 2 * repeated
     space = space_of_repeated
     for column in range(repeated, len(widths)):
+        if not widths[column]:
+            continue  # an empty column
         if space + widths[column] > limit and len(columns) > repeated:
             blocks.append(columns)
             columns = list(range(repeated))

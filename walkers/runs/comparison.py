@@ -39,10 +39,12 @@ from walkers.runs.case_text import differing, flattened, readable
 from walkers.runs.draws import ComparedDraws, Draws, compare_draws
 from walkers.runs.draws_text import compared_draws_text
 from walkers.templates.deck import bridge_tables_digest
-from walkers.text import aligned, with_unit
+from walkers.terminal import fitted_lines, table_width
+from walkers.text import aligned_blocks, with_unit
 
 if TYPE_CHECKING:
     from walkers.inputs.tables.case import Case
+from walkers.inputs.units import with_symbols
 
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
 """Numbers whose scatter is in the result."""
@@ -208,13 +210,13 @@ def _parameters_text(parameters: Sequence[_Parameter], names: Sequence[str]) -> 
         return "the cases are the same"
     rows = [["parameter", *names, "source"]]
     for parameter in parameters:
-        values = [readable(parameter.key, value) for value in parameter.values]
+        values = [with_symbols(readable(parameter.key, value)) for value in parameter.values]
         sources: list[str] = []
         for word in parameter.origin_words:
             if word and word not in sources:
                 sources.append(word)
         rows.append([parameter.key, *values, " / ".join(sources)])
-    return aligned(rows)
+    return aligned_blocks(rows, table_width())
 
 
 def _has_other_bridge_tables(side: ComparedRun) -> bool:
@@ -337,16 +339,16 @@ def _results_text(
         paragraphs += _table_of_numbers(differing_numbers, runs)
     errors = _error_lines(differing_numbers, runs, draws)
     if errors:
-        paragraphs.append("\n".join(errors))
+        paragraphs.append(fitted_lines(errors))
     if draws is not None:
         paragraphs.append(compared_draws_text(draws, runs[0].name, runs[1].name))
     warnings = []
     for run in runs:
         warnings += [f"{run.name}: warning: {warning}" for warning in run.results.warnings]
     if warnings:
-        paragraphs.append("\n".join(warnings))
+        paragraphs.append(fitted_lines(warnings))
     if same and differing_numbers:
-        paragraphs.append(f"the same in both: {', '.join(same)}")
+        paragraphs.append(fitted_lines([f"the same in both: {', '.join(same)}"]))
     elif same:
         paragraphs.append("all results are the same")
     return paragraphs
@@ -374,12 +376,13 @@ def _table_of_numbers(
         if set(cells) != {_DASH}:
             columns.append((head, *cells))
             has_scatter |= head == "scatter of copies"
-    paragraphs = [aligned(list(zip(*columns, strict=True)))]
+    paragraphs = [aligned_blocks(list(zip(*columns, strict=True)), table_width())]
     if has_scatter:
-        paragraphs.append(
+        meaning = (
             "scatter of copies: how much copies differ by their start; "
             "it is not an error of the difference"
         )
+        paragraphs.append(fitted_lines([meaning]))
     return paragraphs
 
 

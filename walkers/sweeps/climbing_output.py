@@ -23,7 +23,8 @@ from walkers.postprocess.show.drawing import (
 )
 from walkers.rounding import percent
 from walkers.sweeps.climbing import CONFIDENCE, DRAWS, PARTS, WALLS_OF_CORNER
-from walkers.text import aligned
+from walkers.terminal import table_width
+from walkers.text import aligned_with_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -139,7 +140,7 @@ def describe_climbs(climbs: Sequence[Mapping[str, Any]]) -> str:
     for condition in climbs:
         texts = texts_of(condition)
         rows = [[name, text] for name, text in texts.items() if text != _MISSING]
-        blocks.append(aligned(rows))
+        blocks.append(aligned_with_text(rows, table_width()))
     note = f"rates per run and second; in brackets {percent(CONFIDENCE)} confidence"
     return "\n\n".join([*blocks, note])
 

@@ -63,6 +63,7 @@ from walkers.sweeps.workers import (
     pilots,
     threads,
 )
+from walkers.terminal import fitted_lines
 from walkers.text import with_unit
 from walkers.warning import warn_user
 
@@ -232,7 +233,7 @@ class SweepPlan:
             f"{duration_text(self.wall_seconds)} with {at_once} in parallel",
             f"  directory  {self.record.directory}",
         ]
-        return "\n".join(lines)
+        return fitted_lines(lines)
 
 
 def plan_sweep(
