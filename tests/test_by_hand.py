@@ -112,7 +112,7 @@ def test_a_deck_run_by_hand_says_so(finished: Path) -> None:
     assert "(already run)" not in run.describe()
 
 
-@pytest.mark.parametrize("command", ["run", "plot", "export --to vtk", "check files"])
+@pytest.mark.parametrize("command", ["run", "plot", "export --format vtk", "check files"])
 def test_a_deck_run_by_hand_is_a_run_for_commands(finished: Path, command: str) -> None:
     run_case(finished)
     assert call(*command.split(), str(finished)).returncode == 0

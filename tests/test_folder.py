@@ -820,7 +820,7 @@ def test_the_next_export_removes_exports_that_were_killed(out: Path) -> None:
     users = run / ".vtk-mine"
     (users / "notes").mkdir(parents=True)
     _killed_export(run)
-    call("export", str(run), "--to", "vtk", check=True)
+    call("export", str(run), "--format", "vtk", check=True)
     assert list(run.glob(".vtk-*")) == [users]
 
 

@@ -38,7 +38,12 @@ from walkers.postprocess.measure.results import (
     text,
 )
 from walkers.postprocess.measure.tables import read_columns
-from walkers.postprocess.measure.uncertainty import ACCURACY_NAME, SPREAD_NAME, spread_of
+from walkers.postprocess.measure.uncertainty import (
+    ACCURACY,
+    ACCURACY_NAME,
+    SPREAD_NAME,
+    spread_of,
+)
 from walkers.postprocess.measure.walking import _velocities
 from walkers.rounding import rounded
 from walkers.runs.case_text import quantity_kind
@@ -498,8 +503,13 @@ class MeasuredRun:
 
     @property
     def folder(self) -> Path:
-        """The folder with the run and with those that measured its errors."""
+        """The folder with the run."""
         return self.run.directory.parent
+
+    @property
+    def further_runs(self) -> Path:
+        """The folder with the runs that measured its errors."""
+        return self.run.directory.with_name(f"{self.run.directory.name}{ACCURACY}")
 
 
 def measured_once(once: FillOnce, name: str, case: Case) -> MeasuredRun:
@@ -555,7 +565,7 @@ def test_harder_beads_walk_slower_because_the_large_one_slides_more(
 @pytest.mark.slow
 def test_the_error_of_the_time_step_is_the_change_at_half_of_it(fast_walker: MeasuredRun) -> None:
     half_case = with_step_and_modulus(fig1b_at_90_hz(), 0.5, 1.0)
-    half = walkers.run(half_case, fast_walker.folder)
+    half = walkers.run(half_case, fast_walker.further_runs)
     assert half.cached  # it is one of the runs that measured the errors
     error = fast_walker.accuracy["errors"]["velocity"]
     change = half.result["velocity"] - fast_walker.run.result["velocity"]
@@ -612,18 +622,18 @@ def test_numerical_errors_have_labels_and_stand_beside_their_numbers() -> None:
 def test_an_interrupted_accuracy_continues(tmp_path: Path) -> None:
     """It is interrupted when some of its runs are finished, which are not made again."""
     run = walkers.run(make_case(run=QUICK), tmp_path)
+    manifests = f"{run.directory.name}{ACCURACY}/*/manifest.json"
 
     def interrupt(_: object) -> None:
-        if len(list(tmp_path.glob("*/manifest.json"))) > 2:
+        if len(list(tmp_path.glob(manifests))) > 1:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         measure_accuracy(run.directory, SweepOptions(1), on_progress=interrupt)
     assert "velocity_error" not in run.result
     times = {}
-    for manifest in tmp_path.glob("*/manifest.json"):
-        if manifest.parent != run.directory:  # its own manifest lists the new accuracy.json
-            times[manifest] = manifest.stat().st_mtime_ns
+    for manifest in tmp_path.glob(manifests):
+        times[manifest] = manifest.stat().st_mtime_ns
     assert times
     run.accuracy()
     assert "velocity_error" in run.result
@@ -737,8 +747,8 @@ def hardest_steel(once: FillOnce) -> MeasuredRun:
 
 
 def test_errors_are_changes_at_half_the_step_and_with_harder_beads(steel: MeasuredRun) -> None:
-    half = walkers.run(with_step_and_modulus(steel.run.case, 0.5, 1.0), steel.folder)
-    hard = walkers.run(harder(steel.run.case, 1.953125), steel.folder)
+    half = walkers.run(with_step_and_modulus(steel.run.case, 0.5, 1.0), steel.further_runs)
+    hard = walkers.run(harder(steel.run.case, 1.953125), steel.further_runs)
     assert half.cached
     assert hard.cached
     velocity = steel.run.result["velocity"]
@@ -759,7 +769,7 @@ def test_the_error_of_beads_that_cannot_be_harder_is_that_of_the_time_step(
     hardest_steel: MeasuredRun,
 ) -> None:
     half_case = with_step_and_modulus(hardest_steel.run.case, 0.5, 1.0)
-    half = walkers.run(half_case, hardest_steel.folder)
+    half = walkers.run(half_case, hardest_steel.further_runs)
     assert half.cached
     change = half.result["velocity"] - hardest_steel.run.result["velocity"]
     error = hardest_steel.accuracy["errors"]["velocity"]

@@ -192,9 +192,9 @@ class _PlainHelp:
         if not panel.entries:
             return
         if self.before_panels:
-            usage, *others = self.before_panels
+            usage, *description = self.before_panels
             self.before_panels = []
-            print("\n".join([_complete_usage(usage, panel.entries), *others]))
+            print("\n".join([_complete_usage(usage, panel.entries), *description]))
         meanings = {}
         for entry in panel.entries:
             names = ", ".join(_labels(entry))

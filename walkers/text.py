@@ -224,10 +224,19 @@ def aligned_blocks(
     blocks.append(columns)
     tables = []
     for block in blocks:
-        cells = [[row[column] for column in block] for row in rows]
-        at_right = [place for place, column in enumerate(block) if column in right]
-        tables.append(aligned(cells, at_right))
+        tables.append(_aligned_columns(rows, block, right))
     return "\n\n".join(tables)
+
+
+def _aligned_columns(
+    rows: Sequence[Sequence[str]], columns: Sequence[int], right: Collection[int]
+) -> str:
+    """Some columns of a table, as by `aligned`; ``right`` are indices of the whole table."""
+    cells = []
+    for row in rows:
+        cells.append([row[column] for column in columns])
+    at_right = [place for place, column in enumerate(columns) if column in right]
+    return aligned(cells, at_right)
 
 
 def wrapped_items(items: Sequence[str], width: int) -> list[str]:

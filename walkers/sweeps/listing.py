@@ -103,15 +103,15 @@ def without_members(contents: Sequence[ListEntry]) -> list[ListEntry]:
 def without_draws(contents: Sequence[ListEntry]) -> list[ListEntry]:
     """Contents of a folder without the runs that spreads and accuracies alone have made."""
     draws: set[str] = set()
-    others: set[str] = set()
+    asked_for: set[str] = set()
     for entry in contents:
         if run_of_sweep(entry.name):
             draws.update(entry.runs or ())
         else:
-            others.update(entry.runs or ())
+            asked_for.update(entry.runs or ())
         if entry.requested:
-            others.add(entry.name)
-    return [entry for entry in contents if entry.name not in draws - others]
+            asked_for.add(entry.name)
+    return [entry for entry in contents if entry.name not in draws - asked_for]
 
 
 def as_json(contents: Sequence[ListEntry]) -> list[dict[str, Any]]:

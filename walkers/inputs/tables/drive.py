@@ -571,7 +571,8 @@ class Excitation:
     def _described_harmonics(self, *, in_g: bool) -> str:
         """All harmonics if there are at most three, else the largest and the number of others."""
         if len(self.harmonics) <= _DESCRIBED_HARMONICS:
-            return " + ".join([_described_harmonic(one, in_g=in_g) for one in self.harmonics])
+            texts = [_described_harmonic(harmonic, in_g=in_g) for harmonic in self.harmonics]
+            return " + ".join(texts)
         largest = _described_harmonic(self.largest, in_g=in_g)
         return f"{largest} + {len(self.harmonics) - 1} harmonics up to {self.fastest:g} Hz"
 

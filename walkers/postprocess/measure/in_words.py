@@ -96,8 +96,8 @@ def _verb_of(rotation: float, sliding: float) -> _Verb:
         return _SLIDES_ROLLING_BACKWARD
     if share > 1.0 - _NEARLY:
         return _SLIDES
-    way = f"{_fraction_text(share)} of the way"
-    return _Verb(f"slides {way}", f"slide {way}")
+    part = f"{_fraction_text(share)} of the way"
+    return _Verb(f"slides {part}", f"slide {part}")
 
 
 def _fraction_text(share: float) -> str:
