@@ -79,8 +79,8 @@ _ZEROS: Mapping[str, float] = {"K": 0.0, "degC": 273.15, "°C": 273.15}
 
 _SYMBOLS: Mapping[re.Pattern[str], str] = {
     re.compile(r"(?<=\d )u(?=(m|s|N|g|J)\b)"): "µ",
-    re.compile(r"(?<=[a-z])\^2\b"): "²",
-    re.compile(r"(?<=[a-z])\^3\b"): "³",
+    re.compile(r"(?<=[ /])([a-z]{1,2})\^2\b"): r"\1²",
+    re.compile(r"(?<=[ /])([a-z]{1,2})\^3\b"): r"\1³",
     re.compile(r"(?<=Pa)\*(?=s\b)"): " ",
 }
 """What stands for symbols in case files, and the symbols (`with_symbols`)."""
