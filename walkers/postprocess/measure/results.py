@@ -387,12 +387,12 @@ def text(results: Results, *, cached: bool = False, verbose: bool = False) -> st
         beads do; warnings; the drive; the most important numbers; guessed values; the directory.
     """
     lines = _main_lines(results, cached=cached)
-    motion = motion_in_words(results)
-    if motion:
-        lines += wrapped(f"  {motion}", "  ")
     missing = not_computed(results)
     if missing:
         lines += wrapped(f"  uncertainty not computed: {missing.text}", _INDENT)
+    motion = motion_in_words(results)
+    if motion:
+        lines += wrapped(f"  {motion}", "  ")
     for warning in results.warnings:
         lines += wrapped_after("  warning:", f" {warning}", WARNING, _INDENT)
     lines += wrapped(f"  drive      {drive_text(results)}", " " * _HEAD_WIDTH)
