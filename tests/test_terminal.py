@@ -29,6 +29,7 @@ from walkers.runner.run_directory import is_run_name
 from walkers.runs.conditions import Condition
 from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.spread import POINTS
+from walkers.terminal import styled_status
 from walkers.text import aligned_blocks, aligned_with_text, fitted_table
 
 RANGES = {"contact.restitution": [0.2, 0.8]}
@@ -186,6 +187,17 @@ def test_colours_can_be_forced_in_a_pipe(folder: Path, monkeypatch: pytest.Monke
     monkeypatch.setenv("FORCE_COLOR", "1")
     listed = call("list", check=True, folder=folder).stdout
     assert "\x1b[32mfinished\x1b[0m" in listed
+
+
+@pytest.mark.parametrize(
+    ("status", "colour"),
+    [("3 finished", "32"), ("3 finished, 1 failed", "31"), ("interrupted: 40 % done", "33")],
+)
+def test_a_status_has_the_colour_of_the_worst(
+    status: str, colour: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    assert styled_status(status) == f"\x1b[{colour}m{status}\x1b[0m"
 
 
 def test_colours_do_not_shift_columns(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -32,14 +32,16 @@ ERROR = "bold red"
 ASIDE = "dim"
 """Style of sources and hints."""
 _STATUSES = {
-    "finished": "green",
-    "running": "cyan",
-    "interrupted": "yellow",
     "failed": "red",
+    "FAIL": "red",
+    "ERROR": "red",
+    "interrupted": "yellow",
+    "missing": "yellow",
+    "running": "cyan",
+    "finished": "green",
     "pass": "green",
-    "differs": "red",
 }
-"""Styles of statuses."""
+"""Styles of statuses, the worst first."""
 
 
 def text_width() -> int:
@@ -130,10 +132,12 @@ def styled(text: str, style: str, stream: TextIO | None = None) -> str:
 
 
 def styled_status(text: str) -> str:
-    """A status, such as ``failed: BeadsLost``, in the style of its first word."""
-    words = re.match(r"\w+", text)
-    style = _STATUSES.get(words[0]) if words else None
-    return styled(text, style) if style else text
+    """A status, such as ``failed: BeadsLost``, or several, in the style of the worst."""
+    words = re.findall(r"\w+", text)
+    for status, style in _STATUSES.items():
+        if status in words:
+            return styled(text, style)
+    return text
 
 
 def _has_colours(stream: TextIO) -> bool:
