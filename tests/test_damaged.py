@@ -717,7 +717,9 @@ def test_a_file_system_without_locks_is_named_with_advice(short_case: Path, tmp_
     done = _program([PROGRAM, "run", "short.toml"], {"LD_PRELOAD": library})
     assert done.returncode == 2
     (line,) = (line for line in _own_lines(done.stderr) if "ERROR: ld.so" not in line)
-    assert re.search(r"runs: files cannot be locked \(No locks available\): .*--out", line)
+    assert re.search(
+        r"^walkers: runs: files cannot be locked \(No locks available\): .*--runs", line
+    )
 
 
 @pytest.mark.parametrize(

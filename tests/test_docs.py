@@ -246,7 +246,7 @@ def test_the_table_of_performance_is_the_benchmarks() -> None:
 
 def test_the_first_velocity_stands_beside_the_curve_of_the_paper() -> None:
     text = " ".join((ROOT / "README.md").read_text("utf-8").split())
-    printed = re.search(r"velocity along the heading +([\d.]+) mm/s", text)
+    printed = re.search(r"fig1b: velocity ([\d.]+) mm/s", text)
     assert printed is not None
     by_model, _ = predicted_column([load_case("fig1b")], "velocity")
     curve = 1e3 * by_model[PAPER_FIT][0]

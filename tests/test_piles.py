@@ -581,7 +581,7 @@ def output_of(*command: str) -> str:
 
 
 def test_the_program_prints_the_numbers_of_a_pile(pile_run: Path) -> None:
-    printed = output_of("run", str(pile_run))
+    printed = output_of("run", str(pile_run), "-v")
     assert re.search(r"\n  beads +60\n(.*\n)*  bridges per bead to others, at rest ", printed)
 
 

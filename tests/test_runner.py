@@ -141,6 +141,7 @@ def test_a_run_directory_has_the_case_the_result_and_its_tables(
         "case.json",
         "cycles.parquet",
         "manifest.json",
+        "requested",
         "result.json",
         "segments",
         "trajectory.parquet",

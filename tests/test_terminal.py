@@ -278,7 +278,7 @@ def test_a_result_begins_with_velocity_errors_and_gait(folder: Path) -> None:
     printed = call("run", "mine.toml", check=True, folder=folder).stdout
     velocity = r"mine: velocity [\d.]+ mm/s, band [\d.]+ to [\d.]+ \(2 draws, approximate\)"
     gait = r"the large bead [a-z ]+, the small bead [a-z ]+"
-    assert re.match(rf"{velocity} \(already run\) {gait}", " ".join(printed.split()))
+    assert re.match(rf"{velocity} \(already run\) .*{gait}", " ".join(printed.split()))
 
 
 def test_a_result_says_that_its_uncertainty_is_not_computed(tmp_path: Path) -> None:

@@ -402,7 +402,8 @@ def _options_of(names: str, tokens: list[str], app: App) -> str:
     options = {}
     arguments = apps[-1].assemble_argument_collection()
     for argument in arguments:
-        options[argument.name.removeprefix("--")] = argument.name
+        if argument.field_info.name != "out":  # what is called runs is a folder, not the option
+            options[argument.name.removeprefix("--")] = argument.name
     for argument in arguments:
         options[argument.field_info.name] = argument.name
     return ", ".join(options.get(name, name) for name in names.split(", "))

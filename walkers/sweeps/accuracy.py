@@ -23,7 +23,7 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.materials import STIFFEST
 from walkers.postprocess.measure.results import recorded
 from walkers.postprocess.measure.sides import STEADY_SPEED
-from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME
+from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME, ACCURACY_TITLE
 from walkers.progress import Tell
 from walkers.runner.binary import find_engine
 from walkers.runner.run_directory import case_of, recomputed, run_place
@@ -210,7 +210,7 @@ def _convergence_sweep(case: Case, name: str, factors: Sequence[float]) -> Sweep
         time_steps.append(f"{shorter * step!r} us")
         moduli.append(f"{min(factor * modulus, largest)!r} MPa")
     file = {
-        "title": f"{case.title or case.name}: smaller time steps and harder beads",
+        "title": f"{case.title or case.name}{ACCURACY_TITLE}",
         "case": case.name,
         "zip": [{"run.time_step": time_steps, "contact.youngs_modulus": moduli}],
     }

@@ -9,7 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from walkers.errors import InputError
-from walkers.postprocess.measure.uncertainty import ACCURACY, SPREAD
+from walkers.postprocess.measure.uncertainty import (
+    ACCURACY,
+    ACCURACY_TITLE,
+    SPREAD,
+    SPREAD_TITLE,
+)
 from walkers.rounding import counted
 from walkers.runs.case_text import FlatCase
 from walkers.runs.listing import ListEntry, by_case, bytes_text, folders_in, runs_in
@@ -181,7 +186,7 @@ def _companions_text(companions: Sequence[ListEntry], width: int | None) -> str:
     """Spreads and accuracies as text, a line each, with the condition whose runs they are."""
     lines = [["spread or accuracy", "points", "age", "size", "of"]]
     for sweep in companions:
-        condition, _, _ = sweep.title.rpartition(": ")
+        condition = sweep.title.removesuffix(SPREAD_TITLE).removesuffix(ACCURACY_TITLE)
         status = status_text(sweep.points or {})
         lines.append([sweep.name, status, *sweep.age_and_size, condition or sweep.case])
     return fitted_table(lines, len(lines[0]) - 1, width, styled_column=1)

@@ -29,6 +29,7 @@ from walkers.postprocess.measure.quantities import declared, unit_shown
 from walkers.postprocess.measure.sides import REST
 from walkers.postprocess.measure.uncertainty import (
     SPREAD_NAME,
+    SPREAD_TITLE,
     few_draws,
     fixed_values,
     fixed_values_text,
@@ -177,7 +178,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         "ranges": ranges,
     }
     file = {
-        "title": f"{case.title or case.name}: uncertain values drawn from their ranges",
+        "title": f"{case.title or case.name}{SPREAD_TITLE}",
         "case": case.name,
         "sample": [sample],
     }

@@ -26,10 +26,14 @@ from walkers.terminal import wrapped
 
 SPREAD = "-spread"
 """End of the name of the directory of a spread (`spread_of`)."""
+SPREAD_TITLE = ": uncertain values drawn from their ranges"
+"""End of the title of a spread, after the condition of its run."""
 SPREAD_NAME = "spread.json"
 """Name of the file with the bands in the directory of a spread."""
 ACCURACY = "-accuracy"
 """End of the name of the sweep that measures numerical errors."""
+ACCURACY_TITLE = ": smaller time steps and harder beads"
+"""End of the title of the sweep that measures numerical errors, after the condition of its run."""
 ACCURACY_NAME = "accuracy.json"
 """Name of the file with the numerical errors in a run directory."""
 LEAST_PER_VALUE = 3
