@@ -252,7 +252,7 @@ def test_the_first_velocity_stands_beside_the_curve_of_the_paper() -> None:
     curve = 1e3 * by_model[PAPER_FIT][0]
     excess = 100.0 * (float(printed[1]) / curve - 1.0)
     assert f"{excess:.0f} % above the curve" in text
-    assert f"({curve:.2f} mm/s at this drive, no measured point)" in text
+    assert f"({curve:.2f} mm/s at this drive, no measured point" in text
 
 
 def test_symbols_of_clusters_are_filled_by_how_many_stay_upright() -> None:
