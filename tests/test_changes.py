@@ -99,7 +99,9 @@ def test_changes_that_belong_together_do_not_replace_each_other() -> None:
     }
 
 
-@pytest.mark.parametrize("command", [["show"], ["show", "--theory"], ["export", "--to", "deck"]])
+@pytest.mark.parametrize(
+    "command", [["show"], ["show", "--theory"], ["export", "--format", "deck"]]
+)
 def test_the_program_tells_what_a_change_replaces(command: list[str], in_folder: Path) -> None:
     done = call(*command, "fig1b", "--set", "drive.gamma0=0.4", check=True)
     line = "walkers: drive.gamma0 replaces drive.peak_acceleration of the case\n"

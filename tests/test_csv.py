@@ -97,8 +97,8 @@ def test_what_a_killed_export_left_behind_is_cleaned(run: walkers.Run) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--to", "csv", "--every", "2"], "--every: is for --to vtk, lammps"),
-        (["--to", "vtk", "--units", "mm"], "--units: is for --to csv"),
+        (["--format", "csv", "--every", "2"], "--every: is for --format vtk, lammps"),
+        (["--format", "vtk", "--units", "mm"], "--units: is for --format csv"),
     ],
 )
 def test_options_of_other_exports_are_refused(
@@ -116,7 +116,7 @@ def test_units_that_do_not_exist_are_refused(run: walkers.Run) -> None:
 
 
 def test_a_sweep_in_place_of_a_run_names_the_command_of_its_table(looked_through: Path) -> None:
-    done = call("export", "grid", "--to", "csv", "--out", str(looked_through))
+    done = call("export", "grid", "--format", "csv", "--runs", str(looked_through))
     assert done.returncode == 2
     assert "walkers list " in done.stderr
 
@@ -126,7 +126,7 @@ def test_the_table_of_a_sweep_is_written_in_other_units(
 ) -> None:
     """The keys that vary keep the units of the sweep file."""
     path = tmp_path / "table.csv"
-    command = ("list", "grid", "--out", str(looked_through), "--to", str(path), "--units", "mm")
+    command = ("list", "grid", "--runs", str(looked_through), "--to", str(path), "--units", "mm")
     call(*command, check=True)
     written = pd.read_csv(path)
     table = walkers.load("grid", looked_through).table()  # type: ignore[call-arg]
@@ -148,7 +148,7 @@ def test_keys_that_vary_are_not_converted() -> None:
 
 
 def test_units_of_a_list_need_a_file(looked_through: Path) -> None:
-    done = call("list", "grid", "--units", "mm", "--out", str(looked_through))
+    done = call("list", "grid", "--units", "mm", "--runs", str(looked_through))
     assert done.stderr == "walkers: --units: is for --to\n"
 
 
@@ -166,7 +166,7 @@ def test_pandas_reads_the_units_of_the_table_of_a_sweep(
     looked_through: Path, tmp_path: Path
 ) -> None:
     path = tmp_path / "table.parquet"
-    call("list", "grid", "--out", str(looked_through), "--to", str(path), check=True)
+    call("list", "grid", "--runs", str(looked_through), "--to", str(path), check=True)
     attributes = pd.read_parquet(path).attrs
     assert attributes["units"]["velocity"] == "m/s"
     assert attributes["sweep"] == "grid"
