@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Iterable, Sequence
 
 from walkers.postprocess.measure.quantities import unit_shown
 from walkers.postprocess.measure.uncertainty import few_draws
 from walkers.rounding import percent, rounded
 from walkers.runs.draws import Band, ComparedDraws
-from walkers.text import aligned, with_unit
+from walkers.terminal import table_width, wrapped
+from walkers.text import aligned_blocks, with_unit
 
 HEADS = ("unknowns", "difference", "ratio", "second larger")
 """Heads of the cells of `rows_of`."""
-_WIDTH = 80
-"""Width of wrapped lines, characters."""
 
 
 def compared_draws_text(compared: ComparedDraws, first: str, second: str) -> str:
@@ -35,7 +33,7 @@ def compared_draws_text(compared: ComparedDraws, first: str, second: str) -> str
         *assumptions([compared]),
         *reasons(compared),
     ]
-    return "\n".join([aligned(rows), *wrapped(sentences)])
+    return "\n".join([aligned_blocks(rows, table_width()), *wrapped_sentences(sentences)])
 
 
 def rows_of(compared: ComparedDraws) -> list[list[str]]:
@@ -143,15 +141,9 @@ def reasons(compared: ComparedDraws) -> list[str]:
     return sentences
 
 
-def wrapped(sentences: Iterable[str]) -> list[str]:
+def wrapped_sentences(sentences: Iterable[str]) -> list[str]:
     """Sentences as lines of a terminal; the further lines of a sentence are indented."""
     lines = []
     for sentence in sentences:
-        lines += textwrap.wrap(
-            sentence,
-            _WIDTH,
-            subsequent_indent="  ",
-            break_on_hyphens=False,
-            break_long_words=False,
-        )
+        lines += wrapped(sentence, "  ")
     return lines

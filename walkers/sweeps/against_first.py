@@ -13,11 +13,19 @@ from walkers.errors import input_error
 from walkers.postprocess.measure.quantities import declared, unit_shown
 from walkers.runs.comparison import Comparison
 from walkers.runs.draws import ComparedDraws, Draws, compare_draws
-from walkers.runs.draws_text import HEADS, assumptions, draws_text, reasons, rows_of, wrapped
+from walkers.runs.draws_text import (
+    HEADS,
+    assumptions,
+    draws_text,
+    reasons,
+    rows_of,
+    wrapped_sentences,
+)
 from walkers.sweeps.left_out import warn_left_out
 from walkers.sweeps.spread import draws_of
 from walkers.sweeps.table import SweepTable, default_column, key_texts
-from walkers.text import aligned, with_unit
+from walkers.terminal import table_width, wrapped
+from walkers.text import aligned_blocks, with_unit
 
 
 def compare_points(table: SweepTable) -> Comparison:
@@ -100,5 +108,7 @@ def _text(table: SweepTable, points: Mapping[int, ComparedDraws]) -> str:
         "difference: less point 0; ratio: over point 0; median and in brackets 5 to 95 % of "
         f"{draws_text(several)}"
     )
-    lines = wrapped([meaning, *assumptions(several), *sentences])
-    return "\n".join([title, "", aligned(rows), "", *lines])
+    names_of_rows = len(texts.columns) + 2  # the point, its keys, and which unknowns these are
+    table_text = aligned_blocks(rows, table_width(), repeated=names_of_rows)
+    lines = wrapped_sentences([meaning, *assumptions(several), *sentences])
+    return "\n".join([*wrapped(title, "  "), "", table_text, "", *lines])
