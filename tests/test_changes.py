@@ -115,6 +115,15 @@ def test_a_sweep_tells_what_a_change_replaces(in_folder: Path) -> None:
     assert done.stderr == "walkers: drive.gamma0 replaces drive.peak_acceleration of the case\n"
 
 
+@pytest.mark.parametrize("command", ["run fig1b", "sweep two.toml"])
+def test_quiet_does_not_tell_what_a_change_replaces(command: str, in_folder: Path) -> None:
+    sweep = 'case = "fig1b"\n[axes]\ndrive.frequency = ["60 Hz", "80 Hz"]\n'
+    (in_folder / "two.toml").write_text(sweep)
+    change = ["--dry-run", "--set", "drive.gamma0=0.4"]
+    assert "replaces" in call(*command.split(), *change, check=True).stderr
+    assert "replaces" not in call(*command.split(), *change, "--quiet", check=True).stderr
+
+
 def test_compare_tells_what_a_change_replaces_once(in_folder: Path) -> None:
     done = call("compare", "fig1b", "--set", "drive.gamma0=0.4", check=True)
     assert done.stderr == "walkers: drive.gamma0 replaces drive.peak_acceleration of the case\n"

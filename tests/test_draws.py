@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pandas as pd
 import pytest
 
 import walkers
-from tests.conftest import TINY, FillOnce, call, document, to_toml
+from tests.conftest import ESCAPE, TINY, FillOnce, call, document, on_terminal, to_toml
 from walkers.errors import InputError
 from walkers.postprocess.measure.uncertainty import spread_of
 from walkers.runs.draws import Band, ComparedDraws, Draws, Unknown, compare_draws
@@ -239,7 +240,23 @@ def test_the_points_of_a_sweep_are_compared_with_the_first(
     assert point == json.loads(json.dumps(of_runs))
     printed = call("compare", "fast", folder=spreads, check=True).stdout
     assert printed.startswith("fast: velocity (mm/s) of each point against point 0 (3 g)\n")
-    assert "\n1      6 g " in printed
+    assert "\n1      common       6 g " in printed
+    assert "\n1      independent  6 g " in printed
+
+
+@pytest.mark.parametrize("names", ["fast", "both points"])
+def test_compared_bands_fit_a_terminal(names: str, both_points: list[Path], spreads: Path) -> None:
+    compared_names = [str(point) for point in both_points] if names == "both points" else [names]
+    printed = ESCAPE.sub("", on_terminal("compare", *compared_names, folder=spreads))
+    lines = [line for line in printed.splitlines() if str(spreads) not in line]
+    assert "second larger" in printed
+    assert max(map(len, lines)) <= 80
+
+
+def test_parts_of_a_split_comparison_name_point_and_unknowns(spreads: Path) -> None:
+    printed = ESCAPE.sub("", on_terminal("compare", "fast", folder=spreads, columns=50))
+    parts = re.findall(r"(?m)^point +unknowns .*\n1 +common .*\n1 +independent .*$", printed)
+    assert len(parts) > 1
 
 
 def test_a_sweep_needs_two_points_with_a_spread(both_points: list[Path], copied_runs: Path) -> None:

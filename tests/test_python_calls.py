@@ -109,6 +109,14 @@ WRONG: dict[str, tuple[Call, str]] = {
         lambda _, sweep: sweep.figure(x=3),  # type: ignore[arg-type]
         "x: 3: expected the name of a key or a column",
     ),
+    "a width that is a number": (
+        lambda _, sweep: sweep.figure(width=85),  # type: ignore[arg-type]
+        "width: 85: expected a width, such as 85mm",
+    ),
+    "points of your own in a number": (
+        lambda _, sweep: sweep.figure(data_files=5),  # type: ignore[arg-type]
+        "data_files: 5: expected a file, or LABEL=FILE",
+    ),
     "one name for several": (
         lambda _, __: walkers.climb("pile-starts"),
         r'expected a list of names, such as \["pile-starts"\]',

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import json
 import os
-import pty
 import re
 import shutil
-import struct
 import subprocess
-import termios
 from collections.abc import Callable
-from contextlib import suppress
-from fcntl import ioctl
 from pathlib import Path
 
 import pytest
 
 import walkers
-from tests.conftest import PROGRAM, SHORT, call, document
+from tests.conftest import ESCAPE, PROGRAM, SHORT, call, document, on_terminal
 from walkers.inputs.case_building import build_case
 from walkers.inputs.tables.case import Case
 from walkers.inputs.units import ACCELERATION, DYNAMIC_VISCOSITY, LENGTH, parse_quantity
@@ -36,8 +31,6 @@ RANGES = {"contact.restitution": [0.2, 0.8]}
 """The range of a value, over which a spread can be made."""
 TWO_FREQUENCIES = 'case = "mine.toml"\n[axes]\ndrive.frequency = ["80 Hz", "90 Hz"]\n'
 """A sweep of a case."""
-ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
-"""A sequence that switches colours."""
 
 
 @pytest.fixture(scope="module")
@@ -60,29 +53,6 @@ def _toml(contents: dict[str, object]) -> str:
 
 def _case() -> Case:
     return build_case(document(run=SHORT, uncertain=RANGES), name="mine")
-
-
-def on_terminal(*arguments: str, folder: Path, columns: int = 80, **variables: str) -> str:
-    """What the program prints on a terminal of its own with so many columns."""
-    ours, theirs = pty.openpty()
-    ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
-    environment = {**os.environ, "TERM": "xterm-256color", **variables}
-    process = subprocess.Popen(
-        [PROGRAM, *arguments],
-        cwd=folder,
-        env=environment,
-        stdin=subprocess.DEVNULL,
-        stdout=theirs,
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(theirs)
-    output = b""
-    with suppress(OSError):  # the end of a terminal is an error
-        while part := os.read(ours, 65536):
-            output += part
-    os.close(ours)
-    assert process.wait() == 0
-    return output.decode().replace("\r\n", "\n")
 
 
 # --- width ----------------------------------------------------------------------------------------

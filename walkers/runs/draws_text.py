@@ -26,7 +26,7 @@ def compared_draws_text(compared: ComparedDraws, first: str, second: str) -> str
         Names of both cases.
     """
     unit, _ = unit_shown(compared.unit)
-    rows = [[f"{with_unit(compared.quantity, unit)}, unknowns", *HEADS[1:]], *rows_of(compared)]
+    rows = [[with_unit(compared.quantity, unit), *HEADS[1:]], *rows_of(compared)]
     sentences = [
         f"difference: {second} less {first}; ratio: {second} over {first}; "
         f"median and in brackets 5 to 95 % of {draws_text([compared])}",

@@ -91,13 +91,11 @@ def _text(table: SweepTable, points: Mapping[int, ComparedDraws]) -> str:
     several = list(points.values())
     unit, _ = unit_shown(several[0].unit)
     texts = key_texts(table.frame)
-    rows = [["point", *texts.columns, *HEADS]]
+    rows = [["point", HEADS[0], *texts.columns, *HEADS[1:]]]
     sentences = []
     for point, compared in points.items():
-        names = [str(point), *texts.loc[point]]
-        for cells in rows_of(compared):
-            rows.append([*names, *cells])
-            names = [""] * len(names)
+        for unknowns, *cells in rows_of(compared):
+            rows.append([str(point), unknowns, *texts.loc[point], *cells])
         sentences += [f"point {point}: {reason}" for reason in reasons(compared)]
     first = ", ".join(texts.astype(str).iloc[0])
     title = (
@@ -108,7 +106,6 @@ def _text(table: SweepTable, points: Mapping[int, ComparedDraws]) -> str:
         "difference: less point 0; ratio: over point 0; median and in brackets 5 to 95 % of "
         f"{draws_text(several)}"
     )
-    names_of_rows = len(texts.columns) + 2  # the point, its keys, and which unknowns these are
-    table_text = aligned_blocks(rows, table_width(), repeated=names_of_rows)
+    table_text = aligned_blocks(rows, table_width(), repeated=2)
     lines = wrapped_sentences([meaning, *assumptions(several), *sentences])
     return "\n".join([*wrapped(title, "  "), "", table_text, "", *lines])
