@@ -119,6 +119,8 @@ def test_a_sweep_in_place_of_a_run_names_the_command_of_its_table(looked_through
     done = call("export", "grid", "--format", "csv", "--runs", str(looked_through))
     assert done.returncode == 2
     assert "walkers list " in done.stderr
+    with pytest.raises(InputError, match=r"its table is given by table\(\)"):
+        walkers.load("grid", looked_through).export("csv")
 
 
 def test_the_table_of_a_sweep_is_written_in_other_units(

@@ -319,6 +319,16 @@ def test_a_size_beyond_its_limits_is_refused(
     assert done.stderr == f"walkers: {message}\n"
 
 
+@pytest.mark.parametrize("option", ["--data", "--width", "--font-size", "--title"])
+def test_options_of_sweeps_are_refused_for_a_run(
+    option: str, fast: walkers.Sweep, made_sweep: Path
+) -> None:
+    run = str(fast.runs[0].directory)
+    done = call("plot", run, option, "9", folder=made_sweep)
+    assert done.returncode == 2
+    assert done.stderr == f"walkers: {option}: is for sweeps\n"
+
+
 def test_python_draws_the_figure_of_the_command(
     fast: walkers.Sweep, made_sweep: Path, tmp_path: Path
 ) -> None:

@@ -93,6 +93,11 @@ def test_a_row_of_a_listing_is_one_line_in_a_pipe(folder: Path) -> None:
     assert "0.3" in row  # the restitution, by which the draws differ
 
 
+def test_the_last_line_of_a_listing_counts_a_single_spread(folder: Path) -> None:
+    listed = call("list", check=True, folder=folder).stdout
+    assert re.match(r"1 run, 1 spread or accuracy, ", listed.splitlines()[-1])
+
+
 TABLE = [("name", "a", "bb"), ("first", "1", "2"), ("second", "30", "40")]
 
 

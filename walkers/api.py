@@ -1132,9 +1132,14 @@ class Sweep:
 
         if form != "archive":
             text = f"is a sweep: expected one of its runs for {form}, or archive"
-            if form == "csv":
-                text += f"; for its table: walkers list {self.directory} --to table.csv"
-            raise input_error(self.directory, text)
+            if form != "csv":
+                raise input_error(self.directory, text)
+            command = f"walkers list {self.directory} --to table.csv"
+            raise input_error(
+                self.directory,
+                f"{text}; its table is given by table()",
+                f"{text}; for its table: {command}",
+            )
         return write_archive(
             self.directory, _path(to), dumps=dumps, authors=authors, licence=licence
         )

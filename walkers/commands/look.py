@@ -127,7 +127,9 @@ def plot(
     """
     loaded = lookup.load(name)
     if isinstance(loaded, walkers.Run):
-        refuse_any(vars(options), "is for sweeps")
+        given = dict(vars(options))
+        given["data"] = given.pop("data_files")  # as the option is called
+        refuse_any(given, "is for sweeps")
         print_lines(loaded.plot(to, formats or ["png"]))
         return
     refuse("--format", bool(formats), "is for runs: a sweep's figure has the format of --to's name")

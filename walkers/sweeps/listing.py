@@ -164,7 +164,8 @@ def listing_text(contents: Sequence[ListEntry], hidden: int = 0, width: int | No
         totals.insert(0, counted(len(sweeps), "sweep"))
     if companions:
         blocks.append(_companions_text(companions, width))
-        totals.append(f"{len(companions)} spreads and accuracies")
+        names = "spread or accuracy" if len(companions) == 1 else "spreads and accuracies"
+        totals.append(f"{len(companions)} {names}")
     blocks += [group.as_text(width) for group in by_case(runs)]
     total = f"{', '.join(totals)}, {bytes_text(sum(entry.size for entry in contents))}"
     if hidden:
