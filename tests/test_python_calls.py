@@ -198,6 +198,18 @@ def test_the_call_that_load_advises_names_the_changed_case(given: str, in_folder
     assert advised.dimers.radii == (0.4e-3, 0.2e-3)
 
 
+def test_the_call_that_load_advises_for_a_changed_run_names_its_case(sweep: Sweep) -> None:
+    run = sweep.runs[0]
+    changes = {"drive.frequency": "71 Hz"}
+    with pytest.raises(walkers.InputError, match="no finished run in ") as caught:
+        walkers.load(run.directory, changes=changes)
+    hint = HINT.search(str(caught.value))
+    assert hint is not None
+    case, folder = eval(hint[1].replace("walkers.run(", "("), {"walkers": walkers})
+    assert case == load_case(run.case, changes)
+    assert Path(folder) == run.directory.parent
+
+
 def test_a_resolved_case_is_changed_under_its_name() -> None:
     case = load_case("fig1b")
     assert load_case(case, {"drive.frequency": "70 Hz"}).name == "fig1b"

@@ -176,7 +176,9 @@ def _run_of_case(named: Reference) -> Run:
 def _call_that_runs(named: Reference) -> str:
     """The call of Python that runs the case of a name, with its changes."""
     case = "case"  # the name of a variable of the user, which has the case or its tables
-    if isinstance(named.given, (str, Path)):
+    if named.kind == "run":
+        case = f'walkers.load("{named.path}").case'
+    elif isinstance(named.given, (str, Path)):
         case = f'"{named.given}"'
     if named.changes:
         case = f"walkers.load_case({case}, {dict(named.changes)})"
