@@ -211,7 +211,7 @@ def test_help_of_a_command_that_does_not_exist_is_refused() -> None:
         ("new", "new [OPTIONS] NAME [CASE]"),
         ("clean", "clean [OPTIONS] [RUN|SWEEP...]"),
         ("list", "list [OPTIONS] [SWEEP]"),
-        ("compare", "compare [OPTIONS] RUN [OTHER]"),
+        ("compare", "compare [OPTIONS] RUN|SWEEP [OTHER]"),
     ],
 )
 def test_usage_has_the_names_of_the_arguments(command: str, usage: str) -> None:
@@ -220,7 +220,7 @@ def test_usage_has_the_names_of_the_arguments(command: str, usage: str) -> None:
 
 
 def test_help_lists_the_choices_of_an_option() -> None:
-    assert "--format deck|vtk|lammps|archive\n" in call("help", "export", check=True).stdout
+    assert "--format deck|vtk|lammps|csv|archive\n" in call("help", "export", check=True).stdout
     assert "--log x|y|xy" in call("help", "plot", check=True).stdout
 
 
