@@ -14,6 +14,7 @@ from typing import Any
 from walkers.calibration.file import Calibration, read_calibration
 from walkers.inputs.reading import find_input
 from walkers.inputs.toml import read_toml
+from walkers.inputs.units import SPEED, parse_quantity
 
 Document = dict[str, Any]
 """The tables of a calibration file."""
@@ -75,13 +76,17 @@ def _without_edges(document: Document) -> None:
 
 
 def _with_viscosity(document: Document) -> None:
-    """The friction of the beads grows with the product of velocity and viscosity."""
+    """The friction of the beads grows with the product of velocity and viscosity.
+
+    The velocity of half of the rise is the calibration's with the oil of most figures, and lower by
+    the ratio of the viscosities with that of Fig. 4b.
+    """
     contact = document["set"].pop("contact")
     velocity = contact["friction"]["bead_bead"]["half_rise_velocity"]
     for name, changes in document["experiments"].items():
         of_experiment = velocity
         if name == "fig4b":
-            of_experiment = f"{1.0 / _VISCOSITY_OF_FIG_4B:.4g} m/s"
+            of_experiment = f"{parse_quantity(velocity, SPEED) / _VISCOSITY_OF_FIG_4B:.4g} m/s"
         contact_of_experiment = {"friction": {"bead_bead": {"half_rise_velocity": of_experiment}}}
         changes["contact"] = contact_of_experiment
 
@@ -130,6 +135,7 @@ _COULOMB_TWO_WALLS = {
 _COULOMB_ONE_WALL = {"friction_wall": 0.25, "friction_bead": 0.11, **_ESTIMATED}
 
 LAWS: Mapping[str, FrictionLaw] = {
+    # Without changes: the calibration `ruby-grows` is `ruby` under the name of its law.
     "grows": FrictionLaw("beads grow; edges"),
     "grows-with-viscosity": FrictionLaw("beads grow with ηv; edges", (_with_viscosity,)),
     "saturates": FrictionLaw("beads grow and saturate; edges", (_beads_saturate,)),

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from math import pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +15,8 @@ import walkers
 from studies.literature import experiments
 from tests.conftest import COULOMB
 from walkers.arrays import FloatArray, Vector
-from walkers.inputs.reading import load_case
+from walkers.errors import InputError
+from walkers.inputs.reading import find_input, load_case, read_case
 from walkers.inputs.resolving.loads import contact_loads, surfaces_of
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import BOTTOM
@@ -235,3 +238,57 @@ def test_a_recorded_law_is_found_again_in_tables_with_edges() -> None:
     surfaces = surfaces_of(case, SMALL_RADIUS, np.inf)
     curve = RecordedLaw(tables, None)(surfaces)
     assert curve.rupture == pytest.approx(case.law(surfaces).rupture)
+
+
+LIBRARY = """
+[materials."my ruby"]
+density = { value = "4.0 g/cm^3", source = "weighed" }
+
+[[surface_pairs]]
+materials  = ["my ruby", "my ruby"]
+edge_ratio = { value = 2.0, source = "mine" }
+"""
+"""A library with a factor for the edges of menisci on two surfaces of one material."""
+OF_BEADS = {"beads.material": "my ruby", "boundary.material": "glass"}
+
+
+@pytest.fixture
+def with_library() -> dict[str, Any]:
+    """The case ``fig1b`` with this library."""
+    document = read_case(find_input("fig1b", "case"))
+    return {**document, "library": tomllib.loads(LIBRARY)}
+
+
+def test_a_factor_of_a_library_for_two_beads_alone_is_refused(with_library: dict[str, Any]) -> None:
+    """All menisci have that of beads and boundary, which this library does not have."""
+    with pytest.raises(InputError) as error:
+        load_case(with_library, OF_BEADS)
+    (problem,) = error.value.problems
+    assert problem.key == "liquid.edge_ratio"
+    assert "2.0 for my ruby on my ruby" in problem.expected
+    assert "that of my ruby on glass: give edge_ratio there or here" in problem.expected
+
+
+def test_a_factor_of_a_case_precedes_that_of_a_library_for_two_beads(
+    with_library: dict[str, Any],
+) -> None:
+    case = load_case(with_library, {**OF_BEADS, "liquid.edge_ratio": 0.5})
+    assert case.liquid.edge_ratio == 0.5
+
+
+def test_a_boundary_of_the_material_of_the_beads_has_the_factor_of_this_pair(
+    with_library: dict[str, Any],
+) -> None:
+    case = load_case(with_library, {**OF_BEADS, "boundary.material": "my ruby"})
+    assert case.liquid.edge_ratio == 2.0
+
+
+def test_the_factor_of_beads_and_boundary_precedes_that_of_two_beads(
+    with_library: dict[str, Any],
+) -> None:
+    at_boundary = {
+        "materials": ["my ruby", "glass"],
+        "edge_ratio": {"value": 3.0, "source": "mine"},
+    }
+    with_library["library"]["surface_pairs"].append(at_boundary)
+    assert load_case(with_library, OF_BEADS).liquid.edge_ratio == 3.0

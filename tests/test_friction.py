@@ -15,14 +15,17 @@ from studies.literature import experiments
 from tests.conftest import COULOMB, origins
 from walkers.arrays import FloatArray
 from walkers.errors import InputError
-from walkers.inputs.reading import load_case
+from walkers.inputs.reading import find_input, load_case, read_case
 from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.loads import contact_loads
-from walkers.inputs.sweep import expand
+from walkers.inputs.sweep import expand, load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.walls import BOTTOM
 from walkers.physics.friction import SlidingFriction
+from walkers.postprocess.measure.uncertainty import uncertain_value_lines, uncertain_values
 from walkers.runner.binary import find_engine
+from walkers.runs.case_text import flattened
+from walkers.runs.listing import ListEntry, by_case
 from walkers.second_engine import scenes
 from walkers.second_engine.engine import SecondEngine
 from walkers.second_engine.lines import Verdict
@@ -281,6 +284,89 @@ def test_a_number_replaces_a_table() -> None:
     assert case.contact.friction.between_beads == SlidingFriction(0.11)
 
 
+def keys_of(place: str, law: SlidingFriction) -> dict[str, Any]:
+    """The changes of a case that give all keys of a law at a place."""
+    return {f"{place}.{part}": value for part, value in table(law).items()}
+
+
+REPLACES = "give all keys of the table that replaces it: contact.friction."
+"""Part of the message about some keys of a table in the place of a number."""
+
+
+@pytest.mark.parametrize(
+    ("case", "changes", "message"),
+    [
+        pytest.param(
+            "climber",
+            {f"{AT_WALL}.at_rest": 0.1},
+            f"{AT_WALL}.at_rest = 0.1: {AT_WALL} is the number 0.5 here; {REPLACES}bead_wall"
+            ".at_rest, .rise, .half_rise_velocity",
+            id="number of the case",
+        ),
+        pytest.param(
+            "fig1b",
+            {BETWEEN_BEADS: 0.1, f"{BETWEEN_BEADS}.rise": 1},
+            f"{BETWEEN_BEADS}.rise = 1: {BETWEEN_BEADS} is the number 0.1 here; {REPLACES}",
+            id="number beside it",
+        ),
+        pytest.param(
+            "fig1b",
+            {f"{BETWEEN_BEADS}.rise": 1, BETWEEN_BEADS: 0.1},
+            f"{BETWEEN_BEADS}.rise = 1: {BETWEEN_BEADS} is the number 0.1 here; {REPLACES}",
+            id="number after it",
+        ),
+        pytest.param(
+            "fig1b",
+            {BETWEEN_BEADS: 0.1, **keys_of(BETWEEN_BEADS, LAW)},
+            "is given as the number 0.1 too; expected either of them",
+            id="number and table",
+        ),
+        pytest.param(
+            "fig1b",
+            {f"{AT_WALL}.rise": 1},
+            f"{AT_WALL}.at_rest: missing; without the table, {AT_WALL} is the number 0.2: "
+            f"{REPLACES}",
+            id="number of the library",
+        ),
+    ],
+)
+def test_a_part_of_a_table_in_the_place_of_a_number_is_refused(
+    case: str, changes: Mapping[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError) as error:
+        load_case(case, changes)
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize("case", ["climber", "fig1b"])
+def test_all_keys_of_a_table_replace_the_number(case: str) -> None:
+    """That of the case ``climber``, and that of the library for ``fig1b``."""
+    changed = load_case(case, keys_of(AT_WALL, LAW))
+    assert changed.contact.friction.at_walls == LAW
+
+
+def test_a_part_of_a_table_counts_wherever_the_table_is_among_the_changes() -> None:
+    case = load_case("fig1b", {f"{BETWEEN_BEADS}.rise": 0.3, BETWEEN_BEADS: table(LAW)})
+    assert case.contact.friction.between_beads == LAW._replace(rise=0.3)
+
+
+@pytest.mark.parametrize(
+    ("case", "name", "message"),
+    [
+        ("climber", f"{BETWEEN_BEADS}.rise", f"{BETWEEN_BEADS} is the number 0.5 here"),
+        ("fig1b", BETWEEN_BEADS, f"is a table in the case; expected {BETWEEN_BEADS}.at_rest or"),
+    ],
+)
+def test_a_range_of_the_other_form_of_a_friction_is_refused(
+    case: str, name: str, message: str
+) -> None:
+    document = {**read_case(find_input(case, "case")), "uncertain": {name: [0.01, 0.9]}}
+    with pytest.raises(InputError) as error:
+        load_case(document)
+    assert f"uncertain.{name} = [0.01, 0.9]: " in str(error.value)
+    assert message in str(error.value)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -371,6 +457,21 @@ def test_a_library_without_the_velocity_of_a_rise_is_refused(own_case: Path) -> 
         load_case(own_case)
 
 
+def test_a_library_with_the_table_of_a_case_is_refused_in_one_sentence(own_case: Path) -> None:
+    library = own_case.parent / "library.toml"
+    lines = [line for line in LIBRARY.splitlines() if "rise" not in line]
+    text = "\n".join(lines).replace(
+        'friction = { value = 0.03, source = "a tribometer", range = [0.02, 0.05] }',
+        'friction = { at_rest = 0.03, rise = 0.5, half_rise_velocity = "80 mm/s" }',
+    )
+    library.write_text(text)
+    with pytest.raises(InputError) as error:
+        load_case(own_case)
+    (problem,) = error.value.problems
+    assert problem.key == "surface_pairs[0].friction"
+    assert "keys of their own beside it, friction_rise and half_rise_velocity" in problem.expected
+
+
 def test_the_roughness_of_materials_without_a_range_has_none(own_case: Path) -> None:
     assert origins(load_case(own_case))["contact.roughness.bead_bead"].range is None
 
@@ -380,6 +481,38 @@ def test_a_sweep_varies_the_rise() -> None:
     sweep = expand(document, source="test", name="test")
     rises = [case.contact.friction.between_beads.rise for case in sweep.cases()]
     assert rises == [0.2, 0.4]
+
+
+def test_a_sweep_of_a_part_where_the_case_has_a_number_is_refused() -> None:
+    document = {"case": "climber", "axes": {f"{BETWEEN_BEADS}.rise": [0.2, 0.4]}}
+    with pytest.raises(InputError, match=f"{BETWEEN_BEADS} is the number 0.5 here"):
+        expand(document, source="test", name="test")
+
+
+def test_a_sweep_does_not_vary_a_friction_and_a_part_of_it() -> None:
+    axes = {BETWEEN_BEADS: [0.1, 0.2], f"{BETWEEN_BEADS}.rise": [0.2, 0.4]}
+    with pytest.raises(InputError, match=r"bead_bead\.rise: varies on two axes"):
+        expand({"case": "fig1b", "axes": axes}, source="test", name="test")
+
+
+def test_a_part_of_what_varies_in_a_sweep_cannot_be_set() -> None:
+    document = {"case": "fig1b", "axes": {BETWEEN_BEADS: [0.1, 0.2]}}
+    with pytest.raises(InputError, match="varies in this sweep and cannot be set"):
+        load_sweep(document, {f"{BETWEEN_BEADS}.rise": 0.4})
+
+
+@pytest.mark.parametrize(
+    ("in_file", "changes", "expected"),
+    [
+        ({BETWEEN_BEADS: table(LAW)}, {BETWEEN_BEADS: 0.1}, SlidingFriction(0.1)),
+        ({BETWEEN_BEADS: 0.1}, keys_of(BETWEEN_BEADS, LAW), LAW),
+    ],
+)
+def test_a_change_of_a_sweep_replaces_the_other_form_of_a_friction(
+    in_file: Mapping[str, Any], changes: Mapping[str, Any], expected: SlidingFriction
+) -> None:
+    (case,) = load_sweep({"case": "fig1b", "set": in_file}, changes).cases()
+    assert case.contact.friction.between_beads == expected
 
 
 @pytest.fixture
@@ -407,3 +540,45 @@ def test_a_table_does_not_take_its_friction_at_rest_from_coulombs_law(
 def test_a_table_without_its_velocity_is_refused(case_by_coulomb: Path) -> None:
     with pytest.raises(InputError, match=r"bead_bead\.half_rise_velocity: missing"):
         load_case(case_by_coulomb, {BETWEEN_BEADS: {"at_rest": 0.1, "rise": 0.2}})
+
+
+# --- results and lists ----------------------------------------------------------------------------
+
+
+def test_a_list_of_runs_shows_a_number_and_a_growing_friction_in_one_column() -> None:
+    """Such as 0.1 + 0.4 v/(v + 20 mm/s)."""
+    runs = []
+    for name, friction in [("first", 0.25), ("second", table(LAW))]:
+        case = load_case("fig1b", {AT_WALL: friction})
+        entry = ListEntry(
+            kind="run",
+            name=name,
+            case="fig1b",
+            status="finished",
+            directory=Path(name),
+            parameters=flattened(case),
+        )
+        runs.append(entry)
+    (runs_of_case,) = by_case(runs)
+    head, first, second = runs_of_case.as_text().splitlines()
+    column = head.index("bead_wall")
+    assert first[column:].startswith("0.25 ")
+    assert second[column:].startswith("0.1 + 0.4 v/(v + 20 mm/s)")
+
+
+@pytest.mark.parametrize(("liquid", "head"), [("Si AK5", "assumed"), ("glycerol 87 %", "guessed")])
+def test_a_result_has_the_velocity_of_an_uncertain_rise(liquid: str, head: str) -> None:
+    """With a liquid other than that of the calibration, it is a guess as the rise is."""
+    case = load_case("fig1b", {"liquid.name": liquid})
+    lines = uncertain_value_lines(uncertain_values(case.origins))
+    words = " ".join(" ".join(lines).split())
+    before, _, _ = words.partition("friction.bead_bead.half_rise_velocity 1 m/s")
+    assert before != words
+    heads = [word for word in before.split() if word in {"guessed", "calibrated", "assumed"}]
+    assert heads[-1] == head
+
+
+def test_a_result_has_no_velocity_of_a_rise_without_a_range() -> None:
+    case = load_case("fig1b", WALKER)
+    keys = [value["key"] for value in uncertain_values(case.origins)]
+    assert f"{BETWEEN_BEADS}.half_rise_velocity" not in keys

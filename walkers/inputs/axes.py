@@ -17,7 +17,7 @@ import numpy as np
 
 from walkers.arrays import FloatArray
 from walkers.errors import key_error
-from walkers.inputs.keys import DISTRIBUTIONS, SPACINGS, Value, flatten
+from walkers.inputs.keys import DISTRIBUTIONS, SPACINGS, Value, flatten, is_below
 from walkers.inputs.units import as_quantity
 
 MOST_POINTS_OF_SWEEP = 1_000_000
@@ -430,7 +430,7 @@ def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Valu
     keys: list[str] = []
     for axis in axes:
         for key in axis.keys:
-            if any(_overlap(earlier, key) for earlier in keys):
+            if any(overlap(earlier, key) for earlier in keys):
                 raise key_error(key, "varies on two axes; expected one")
             keys.append(key)
     number = prod(len(axis.rows) for axis in axes)
@@ -445,8 +445,6 @@ def combinations(axes: Sequence[Axis]) -> tuple[tuple[str, ...], list[tuple[Valu
     return tuple(keys), rows
 
 
-def _overlap(first: str, second: str) -> bool:
-    """Whether two keys are the same, or one is an entry of the list that the other is."""
-    list_of_first = first.partition("[")[0]
-    list_of_second = second.partition("[")[0]
-    return first in (second, list_of_second) or second == list_of_first
+def overlap(first: str, second: str) -> bool:
+    """Whether two keys are the same, or one is a part of the value of the other."""
+    return first == second or is_below(first, second) or is_below(second, first)

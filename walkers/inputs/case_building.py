@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from walkers.errors import InputError, Problem, apply_all, input_error, key_error
 from walkers.inputs.axes import NotARange, range_of
-from walkers.inputs.config_table import alternatives, changed, contradictions
+from walkers.inputs.config_table import ConfigTable, alternatives, changed, contradictions
 from walkers.inputs.keys import flatten, value_at
 from walkers.inputs.messages import attributed_to, check_key, validated
 from walkers.inputs.resolving.from_library import NAMES, SUPPLIED, supplied
@@ -67,8 +67,8 @@ def build_case(
             document = changed(CaseFile, document, changes)
     with attributed_to(source, document):
         document = _with_record(with_files(document))
-        tables, sources, unknown = supplied(document, library_of(document, source))
-        file = _validated(tables, unknown, source)
+        tables, sources, of_library = supplied(document, library_of(document, source))
+        file = _validated(tables, of_library, source)
         try:
             case = resolve(file, name=name, document=document, sources=sources)
         except ArithmeticError as error:
@@ -135,9 +135,10 @@ def _with_record(document: Mapping[str, Any]) -> dict[str, Any]:
     return tables
 
 
-def _validated(tables: Mapping[str, Any], unknown: list[Problem], source: str) -> CaseFile:
-    """The tables as a case file; ``unknown`` are problems of names that the library lacks."""
-    further = [*unknown, *contradictions(CaseFile, tables)]
+def _validated(tables: Mapping[str, Any], of_library: list[Problem], source: str) -> CaseFile:
+    """The tables as a case file; ``of_library`` are problems of what the library was to give."""
+    further = [*of_library, *contradictions(CaseFile, tables)]
+    unknown = [problem for problem in of_library if problem.key not in SUPPLIED]
     try:
         return validated(CaseFile, tables, source, further=further)
     except InputError as error:
@@ -185,8 +186,12 @@ def _check_uncertain(
 
 
 def _check_has_value(case: Case, name: str) -> None:
-    """Refuse an uncertain key for which the case has another one."""
-    if case.value_of(name) is not None:
+    """Refuse an uncertain key for which the case has another one, or a table."""
+    value = case.value_of(name)
+    if isinstance(value, ConfigTable):
+        keys = " or ".join(key for key, _, _ in value.leaves(f"{name}."))
+        raise key_error(name, f"is a table in the case; expected {keys}")
+    if value is not None:
         return
     instead = sorted(key for key in alternatives(CaseFile, name) if case.value_of(key))
     if instead:

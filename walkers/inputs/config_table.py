@@ -17,7 +17,7 @@ from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, PydanticUndefined
 
 from walkers.errors import InputError, Problem, key_error, quoted
-from walkers.inputs.keys import MISSING, joined, parts_of, value_at
+from walkers.inputs.keys import MISSING, is_below, joined, parts_of, value_at
 from walkers.inputs.units import WRITTEN, is_auto, kind_in
 
 T = TypeVar("T")
@@ -418,6 +418,11 @@ def is_table(field: FieldInfo | None) -> bool:
     return not any(isinstance(item, Discriminator) for item in field.metadata)
 
 
+def is_number_or_table(field: FieldInfo | None) -> bool:
+    """Whether the value of a field may be a number, or a table in its place."""
+    return table_class_of(field) is not None and not is_table(field)
+
+
 def example_of(field: FieldInfo) -> str:
     """An example of a value, as in ``a value such as "80 Hz"``, or its type if there is none."""
     if field.examples:
@@ -457,6 +462,12 @@ def contradictions(model: type[ConfigTable], document: Any, place: str = "") -> 
             yield from contradictions(table, value, inner_place)
 
 
+def _field_at(model: type[ConfigTable], parts: Iterable[str | int]) -> FieldInfo | None:
+    """The field at names of tables and indices of lists; None if a kind of file has no such key."""
+    names = [part for part in parts if isinstance(part, str)]
+    return dotted_keys(model).get(".".join(names))
+
+
 def alternatives(model: type[ConfigTable], name: str, value: object = None) -> set[str]:
     """The dotted keys that a dotted key of a kind of file excludes.
 
@@ -473,8 +484,7 @@ def alternatives(model: type[ConfigTable], name: str, value: object = None) -> s
     *path, last = parts_of(name)
     table: type[ConfigTable] | None = model
     if path:
-        names_in_path = [part for part in path if isinstance(part, str)]
-        table = table_class_of(dotted_keys(model).get(".".join(names_in_path)))
+        table = table_class_of(_field_at(model, path))
     if table is None:
         return set()
     return {joined([*path, other_name]) for other_name in table.replaced_by(str(last), value)}
@@ -494,14 +504,38 @@ def replaced_keys(
     -------
     dict
         For each change that replaces other keys of the document, these keys in alphabetical order.
+        A number replaces the keys of a table in its place, and each key of the table the number.
     """
     replaced: dict[str, list[str]] = {}
     for name, value in changes.items():
         excluded = alternatives(model, name, value) - changes.keys()
         given = [key for key in excluded if value_at(document, parts_of(key)) is not MISSING]
+        given += _replaced_form(model, document, name, changes)
         if given:
             replaced[name] = sorted(given)
     return replaced
+
+
+def _replaced_form(
+    model: type[ConfigTable], document: Mapping[str, Any], name: str, changes: Mapping[str, Any]
+) -> list[str]:
+    """The keys of the other form of a value that may be a number or a table.
+
+    The parameters are those of `replaced_keys`, and the dotted key of one of the changes. Empty if
+    the document has the same form, or if `changed` refuses the change.
+    """
+    present = value_at(document, parts_of(name))
+    if isinstance(present, Mapping) and not isinstance(changes[name], Mapping):
+        if is_number_or_table(_field_at(model, parts_of(name))):
+            return [key_within(name, part) for part in present]
+        return []
+    place = joined(parts_of(name)[:-1])
+    number = value_at(document, parts_of(place))
+    if number is MISSING or isinstance(number, Mapping) or place in changes:
+        return []
+    if gives_whole_table(model, place, changes):
+        return [place]
+    return []
 
 
 def changed(
@@ -522,18 +556,94 @@ def changed(
     -------
     dict
         The tables with the changes. Keys that a new one excludes (`alternatives`) are left out,
-        unless they change too.
+        unless they change too. A key and a part of its value may change together: the part counts.
+        All keys of a table replace the number that may stand in its place.
 
     Raises
     ------
     InputError
-        If a key leads to an entry that a list does not have.
+        If a key leads to an entry that a list does not have, or to a part of a table where a number
+        stands in its place.
     """
     tables = copy.deepcopy(dict(document))
-    for name, value in changes.items():
+    parts_last = sorted(changes, key=lambda name: any(is_below(name, whole) for whole in changes))
+    for name in parts_last:
+        value = changes[name]
+        _make_table_of_number(model, tables, name, changes)
         excluded = alternatives(model, name, value) - changes.keys()
         _set_value_at(tables, name, copy.deepcopy(value), excluded)
     return tables
+
+
+def _make_table_of_number(
+    model: type[ConfigTable], tables: dict[str, Any], name: str, changes: Mapping[str, Any]
+) -> None:
+    """Replace a number by an empty table if a dotted key leads into a table in its place.
+
+    Parameters
+    ----------
+    model
+        The class of the whole document.
+    tables
+        The document, which is changed.
+    name
+        The dotted key.
+    changes
+        All changes of the document, with that of the key.
+
+    Raises
+    ------
+    InputError
+        If the changes do not have all keys of the table, or have the number too.
+    """
+    *path, _ = parts_of(name)
+    field = _field_at(model, path)
+    table = table_class_of(field)
+    present = value_at(tables, path)
+    if table is None or not is_number_or_table(field):
+        return
+    if present is MISSING or isinstance(present, Mapping):
+        return
+    place = joined(path)
+    words = quoted(present)
+    if isinstance(present, (int, float)):
+        words = f"the number {words}"
+    if not gives_whole_table(model, place, changes):
+        message = f"{place} is {words} here; {whole_table_of(model, place)}"
+        raise key_error(name, message, changes[name])
+    if place in changes:
+        message = f"{place} is given as {words} too; expected either of them"
+        raise key_error(name, message, changes[name])
+    _set_value_at(tables, place, {}, ())
+
+
+def gives_whole_table(model: type[ConfigTable], place: str, changes: Mapping[str, Any]) -> bool:
+    """Whether changes have all required keys of a table, which may replace a number.
+
+    Parameters
+    ----------
+    model
+        The class of the whole document.
+    place
+        The dotted key of the table, or any other key.
+    changes
+        Values by dotted keys.
+    """
+    field = _field_at(model, parts_of(place))
+    table = table_class_of(field)
+    if table is None or not is_number_or_table(field):
+        return False
+    for part, field_of_part in table_keys(table).items():
+        if field_of_part.is_required() and key_within(place, part) not in changes:
+            return False
+    return True
+
+
+def whole_table_of(model: type[ConfigTable], place: str) -> str:
+    """The end of a message about parts of a table at a dotted key where a number stands."""
+    table = table_class_of(_field_at(model, parts_of(place)))
+    keys = ", ".join(f".{part}" for part in table_keys(table or model))
+    return f"give all keys of the table that replaces it: {place}{keys}"
 
 
 def _set_value_at(tables: dict[str, Any], name: str, value: Any, excluded: Iterable[str]) -> None:

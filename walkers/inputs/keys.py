@@ -43,6 +43,17 @@ def joined(parts: Sequence[str | int]) -> str:
     return key.removeprefix(".")
 
 
+def is_below(key: str, whole_key: str) -> bool:
+    """Whether a dotted key is a part of the value of another one.
+
+    Examples
+    --------
+    >>> is_below("drive.harmonics[1].phase", "drive.harmonics")
+    True
+    """
+    return key.startswith((f"{whole_key}.", f"{whole_key}["))
+
+
 def value_at(document: Any, parts: Sequence[str | int]) -> Any:
     """The value of nested tables and lists by names and indices; `MISSING` if there is none."""
     value = document

@@ -21,13 +21,20 @@ from walkers.inputs.axes import (
     crossed,
     descending,
     one_at_a_time,
+    overlap,
     sampled,
     without_unit,
     zipped,
 )
 from walkers.inputs.case_building import build_case
-from walkers.inputs.config_table import ConfigTable, alternatives, changed, replaced_keys
-from walkers.inputs.keys import Value, flatten
+from walkers.inputs.config_table import (
+    ConfigTable,
+    alternatives,
+    changed,
+    gives_whole_table,
+    replaced_keys,
+)
+from walkers.inputs.keys import Value, flatten, is_below
 from walkers.inputs.messages import attributed_to, check_key, validated
 from walkers.inputs.reading import find_input, keys_of_files, read_case, shipped
 from walkers.inputs.tables.case import Case, CaseFile
@@ -211,12 +218,12 @@ def load_sweep(
             settings = document.get("set", {})
             if not isinstance(settings, Mapping):
                 raise key_error("set", "expected a table of keys")
-            document = {**document, "set": {**flatten(settings), **changes}}
+            document = {**document, "set": _with_changes(settings, changes)}
         name = _name_with(name, changes)
     definition = expand(document, source=source, name=name, folder=folder)
     problems = []
     for key, value in (changes or {}).items():
-        if key in definition.keys:
+        if any(overlap(key, varied) for varied in definition.keys):
             message = "varies in this sweep and cannot be set"
             problems.append(Problem(key, f'"{value}"', message))
     if problems:
@@ -234,6 +241,19 @@ def _name_of_tables(tables: Mapping[str, Any]) -> str:
     except (ValueError, RecursionError) as error:
         raise input_error("<sweep>", "has infinitely nested tables") from error
     return f"sweep@{hashlib.sha256(contents.encode()).hexdigest()[:_DIGITS_OF_DIGEST]}"
+
+
+def _with_changes(settings: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[str, Any]:
+    """The values of ``[set]`` with changes, without what the changes replace.
+
+    A number replaces a table, and all keys of the table replace the number.
+    """
+    remaining = {}
+    for key, value in flatten(settings).items():
+        replaced = any(is_below(key, change) for change in changes)
+        if not replaced and not gives_whole_table(CaseFile, key, changes):
+            remaining[key] = value
+    return {**remaining, **changes}
 
 
 def _name_with(name: str, changes: Mapping[str, Value]) -> str:

@@ -66,6 +66,20 @@ def readable(key: str, value: Any) -> str:
     return text_of(value, kind)
 
 
+def value_text(case: Mapping[str, Any], key: str) -> str:
+    """The value of a key of a flattened case as text, a dash if it has none.
+
+    A friction that grows with the velocity v is ``0.05 + 3.5 v/(v + 1000 mm/s)``.
+    """
+    rise = case.get(f"{key}.rise")
+    if rise is None:
+        return readable(key, case.get(key))
+    at_rest = readable(f"{key}.at_rest", case[f"{key}.at_rest"])
+    velocity_key = f"{key}.half_rise_velocity"
+    velocity = readable(velocity_key, case[velocity_key])
+    return f"{at_rest} + {text_of(rise)} v/(v + {velocity})"
+
+
 @cache
 def quantity_kind(key: str) -> QuantityKind | None:
     """The kind of quantity of a key, such as ``dimers.radii[0]``; None for pure numbers."""

@@ -29,8 +29,8 @@ from walkers.runs.case_text import (
     FlatCase,
     differing,
     flattened,
-    readable,
     short_keys,
+    value_text,
 )
 from walkers.runs.conditions import Condition
 from walkers.runs.making import progress_at
@@ -391,7 +391,7 @@ class RunsOfCase:
             status = run.status
             if run.reason:
                 status = f"{run.status}: {run.reason}"
-            values = [with_symbols(readable(key, run.parameters.get(key))) for key in self.keys]
+            values = [with_symbols(value_text(run.parameters, key)) for key in self.keys]
             lines.append([run.name, status, run.result, *run.age_and_size, *values])
         return fitted_table(lines, len(heads), width, styled_column=1)
 

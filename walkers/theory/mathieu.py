@@ -179,7 +179,9 @@ def turning_rate(case: Case) -> float | None:
 def _mode_of_meshing_spins(dimer: Dimer, modes: npt.NDArray[np.complex128]) -> int:
     """The mode in which beads spin against each other about the vertical, as two wheels in mesh.
 
-    Only edges of menisci damp it, and it does not turn the dimer.
+    With R1 ω1 = -R2 ω2 the surfaces of the beads do not slide on each other, and contacts with the
+    substrate do not resist spins about the vertical. Only edges of menisci damp the mode, and it
+    does not turn the dimer.
 
     Parameters
     ----------
@@ -195,9 +197,13 @@ def _mode_of_meshing_spins(dimer: Dimer, modes: npt.NDArray[np.complex128]) -> i
     """
     masses = np.array(dimer.masses)
     inertias = 0.4 * masses * np.array(dimer.radii) ** 2
+    # Scaled by these roots, the square of a mode is twice its kinetic energy. The first variable,
+    # ψ, has none.
     root_of_energy = np.sqrt(np.concatenate([masses, inertias, inertias]))
     moving = root_of_energy[:, None] * modes[1:]
     first, second = dimer.radii
+    # The spins (ω1, ω2) ∝ (R2, -R1). A share is the cosine of the angle between a mode and these
+    # spins, times the same factor for all modes; its square is the share of the kinetic energy.
     in_mesh = root_of_energy * np.array([0.0, 0.0, 0.0, 0.0, second, -first])
     shares = np.abs(in_mesh @ moving) / np.linalg.norm(moving, axis=0)
     return int(np.argmax(shares))
@@ -216,11 +222,11 @@ class _AxialMotion:
     """Normal forces, N, shape (3, steps)."""
     spin: FloatArray
     """Angular velocities of the beads about the horizontal across the axis, rad/s, shape (2,
-    steps)."""
+    steps); positive for a bead that rolls along the axis."""
     force: FloatArray
     """Force along the axis of the second bead on the first, N, shape (steps,)."""
     torque: FloatArray
-    """Torque of the other bead on each bead, N m, shape (2, steps)."""
+    """Torque of the other bead on each bead, N m, shape (2, steps), with the sign of the spin."""
     velocity: FloatArray
     """Velocity of the walker on the substrate, m/s, shape (steps,)."""
     edges: FloatArray
@@ -263,14 +269,16 @@ def _axial_motion(case: Case, walker: Walker) -> _AxialMotion | None:
     radii = np.array(dimer.radii)[:, None]
     masses = np.array(dimer.masses)[:, None]
     acceleration = translation(slope)
-    # Moments of inertia of solid spheres are 0.4 m R².
-    rolling_torque = 0.4 * masses * radii * (acceleration - slope[:2])
+    # A bead slides at v = V - Rω, so that Rω = V - v. The substrate resists by -(F∥ + f) at the
+    # lowest point, which makes the bead roll forward; its couples act on -ω, hence with a plus on
+    # ω. The torque of the other bead is the rest of I dω/dt, with I = 0.4 m R² of a solid sphere.
+    total_torque = 0.4 * masses * radii * (acceleration - slope[:2])
     return _AxialMotion(
         sliding=sliding,
         normal=np.maximum(normal, 0.0),  # an open contact has no load
         spin=(translation(sliding) - sliding[:2]) / radii,
         force=masses[0] * (acceleration + inertial) + parallel[0],
-        torque=rolling_torque - radii * (parallel[:2] + edge_couples) - couples[:2],
+        torque=total_torque - radii * (parallel[:2] + edge_couples) - couples[:2],
         velocity=velocity,
         edges=edges,
     )
@@ -425,16 +433,21 @@ def _sideways_edges(dimer: Dimer, axial: _AxialMotion) -> tuple[FloatArray, Floa
         vertical = 5 + bead
         substrate_drag = axial.edges[bead] * on_substrate
         forces[bead, :, velocity] = -substrate_drag
+        # This edge resists the velocity of the bead alone: the couple cancels the torque that
+        # `_sideways_slopes` gives to a force at the contact.
         couples[bead, :, velocity] = radii[bead] * substrate_drag
         couples[bead, :, roll] = -(radii[bead] ** 2) * axial.edges[bead] * on_beads[bead]
 
-        # The velocity of the edge of the other bridge on this bead.
-        moving = np.zeros((len(axial.force), 7))
-        moving[:, 0] = radii[bead] * sine * axial.spin[bead]
-        moving[:, 1:3] = shares[bead] * np.array([1.0, -1.0])
-        moving[:, roll] = radii[bead] * sine
-        moving[:, vertical] = -radii[bead] * cosine
-        drag = -side * axial.edges[2] * on_beads[bead][:, None] * moving
-        forces[2] += side * shares[bead] * drag
-        couples[2] += reduced_radius * drag
+        # What the surface of this bead contributes to the sliding of the contact of both.
+        motion = np.zeros((len(axial.force), 7))
+        motion[:, 0] = radii[bead] * sine * axial.spin[bead]
+        motion[:, 1:3] = shares[bead] * np.array([1.0, -1.0])
+        motion[:, roll] = radii[bead] * sine
+        motion[:, vertical] = -radii[bead] * cosine
+        # The edge moves by -motion along the first bead and by +motion along the second one, and
+        # drags the surface along.
+        surface_force = -side * axial.edges[2] * on_beads[bead][:, None] * motion
+        # The force of the contact is that on the first bead: forces on the second count negative.
+        forces[2] += side * shares[bead] * surface_force
+        couples[2] += reduced_radius * surface_force
     return forces, couples

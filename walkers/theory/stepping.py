@@ -180,7 +180,9 @@ def compiled_effect(effect: Effect) -> Effect:
     With the function itself, numba would compile `integrate` anew in each process; and its cache
     would name the module of the function, and could not be loaded where that module is missing.
     """
-    function = getattr(effect, "py_func", effect)  # of one that numba has compiled
+    # What `njit` returns, such as `edge_forces`, has its Python function as `py_func`: `cfunc`
+    # compiles nothing else.
+    function = getattr(effect, "py_func", effect)
     is_ours = effect is edge_forces
     compiled: Effect = cfunc(_OF_EFFECT, cache=is_ours)(function)
     return compiled

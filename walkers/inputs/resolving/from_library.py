@@ -8,12 +8,11 @@ subject of `walkers.inputs.resolving.steps`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
 from walkers.errors import InputError, Problem, expected_of, key_error, quoted
-from walkers.inputs.config_table import alternatives, changed
+from walkers.inputs.config_table import alternatives, changed, whole_table_of
 from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.origins import Source
 from walkers.inputs.resolving.library import Composition, Library, LibraryNumber, unmeasured
@@ -100,7 +99,8 @@ def supplied(
     sources : dict of str to Source
         Sources of the values that were filled in, by their keys.
     problems : list of Problem
-        Names that the library does not know, and wrong compositions of the liquid.
+        Names that the library does not know, wrong compositions of the liquid, and keys that are
+        missing because of what the library has instead.
     """
     names = {key: _name_at(document, key) for key in NAMES}
     given = {key for key in SUPPLIED if value_at(document, parts_of(key)) is not MISSING}
@@ -125,6 +125,11 @@ def supplied(
     if composition and value_at(document, parts_of(_TEMPERATURE)) is MISSING:
         sources[_TEMPERATURE] = Source("default", text=_DEFAULT_TEMPERATURE)
     written: dict[str, Any] = {}
+    problems += _incomplete_tables(document, values)
+    if "liquid.edge_ratio" not in given and "liquid.edge_ratio" not in values:
+        problems += _edges_of_beads_alone(
+            library, names["beads.material"], names["boundary.material"]
+        )
     other_forms = _keys_of_other_forms(document, values)
     for key in SUPPLIED:
         if key in other_forms:
@@ -157,6 +162,42 @@ def _keys_of_other_forms(
         else:
             not_taken |= {f"{key}.{part}" for part in _LAW}
     return not_taken
+
+
+def _incomplete_tables(
+    document: Mapping[str, Any], values: Mapping[str, LibraryNumber]
+) -> list[Problem]:
+    """Missing keys of tables of friction where the library has a number.
+
+    ``values`` are as from `_values`.
+    """
+    problems = []
+    for key in _FRICTION:
+        written = value_at(document, parts_of(key))
+        if not isinstance(written, Mapping) or key not in values or f"{key}.rise" in values:
+            continue
+        number = values[key].written
+        message = f"missing; without the table, {key} is the number {number}: "
+        message += whole_table_of(CaseFile, key)
+        problems += [
+            Problem(f"{key}.{part}", None, message) for part in _LAW if part not in written
+        ]
+    return problems
+
+
+def _edges_of_beads_alone(
+    library: Library, bead_material: str | None, boundary_material: str | None
+) -> list[Problem]:
+    """The problem of a factor for edges that two beads have, but beads and boundary do not."""
+    edge_ratio = library.surface_pair(bead_material, bead_material).get("edge_ratio")
+    if edge_ratio is None:
+        return []
+    message = (
+        f"missing; the library has {edge_ratio.written} for {bead_material} on {bead_material}, "
+        f"but one factor holds at all menisci, that of {bead_material} on {boundary_material}: "
+        "give edge_ratio there or here"
+    )
+    return [Problem("liquid.edge_ratio", None, message)]
 
 
 def _name_at(document: Mapping[str, Any], key: str) -> str | None:
@@ -279,7 +320,7 @@ def _source_of(key: str, number: LibraryNumber, liquid: str | None) -> Source:
     """
     default = unmeasured().get(key)
     if key in _WITHOUT_USUAL_VALUES:
-        default = replace(number, calibrated_with=())
+        default = number  # there is no usual value: a guess keeps the range of the library
     measured = bool(number.source) and not number.calibrated_with
     ends = number.range
     if default is None or measured:

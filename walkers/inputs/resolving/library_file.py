@@ -5,13 +5,14 @@ Their models take time to build: only what reads such files imports this module.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Set
 from typing import Annotated, Any, Generic, TypeVar
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from walkers.inputs import units
 from walkers.inputs.config_table import ConfigTable
-from walkers.inputs.tables.materials import SLIDING_VELOCITY
+from walkers.inputs.tables.materials import SLIDING_VELOCITY, FrictionLaw
 from walkers.inputs.units import Coefficient, Number
 
 Q = TypeVar("Q")
@@ -96,6 +97,20 @@ class SurfacePairTable(ConfigTable):
     meniscus_radius: Sourced[units.Length] | None = None
     edge_ratio: Sourced[Number] | None = None
     contact_angle: Sourced[units.UpToRightAngle] | None = None
+
+    @field_validator("friction", mode="before")
+    @classmethod
+    def _is_no_table_of_a_case(cls, friction: object) -> object:
+        """The friction; raises `ValueError` for the table that a case has."""
+        keys: Set[str] = set()
+        if isinstance(friction, Mapping):
+            keys = friction.keys()
+        if keys & FrictionLaw.model_fields.keys():
+            raise ValueError(
+                'expected { value = ..., source = "..." } for the friction at rest; keys of their '
+                "own beside it, friction_rise and half_rise_velocity, have the other two numbers"
+            )
+        return friction
 
     @model_validator(mode="after")
     def _has_a_whole_law_of_friction(self) -> SurfacePairTable:

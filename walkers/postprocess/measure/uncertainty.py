@@ -53,6 +53,9 @@ _HEADS = ("guessed", "uncertain", "given", "calibrated", "assumed", "library", "
 def uncertain_values(origins: Sequence[Origin]) -> list[dict[str, Any]]:
     """List the values of a case that nobody has measured, and those that it calls uncertain.
 
+    The velocity of half of a rise of friction is listed with an uncertain rise, which says nothing
+    without it.
+
     Parameters
     ----------
     origins
@@ -65,9 +68,12 @@ def uncertain_values(origins: Sequence[Origin]) -> list[dict[str, Any]]:
         ``calibrated``, ``assumed`` or ``default``), ``range`` (both ends, or None),
         ``logarithmic``, and whether it is ``guessed``.
     """
+    with_range = {origin.key for origin in origins if origin.range is not None}
     values = []
     for origin in origins:
-        if origin.key not in unmeasured() and origin.range is None:
+        table, _, name = origin.key.rpartition(".")
+        is_of_rise = name == "half_rise_velocity" and f"{table}.rise" in with_range
+        if not (is_of_rise or origin.key in unmeasured() or origin.key in with_range):
             continue
         values.append(
             {
@@ -76,7 +82,8 @@ def uncertain_values(origins: Sequence[Origin]) -> list[dict[str, Any]]:
                 "origin": origin.origin,
                 "range": list(origin.range) if origin.range else None,  # a list, as in the file
                 "logarithmic": origin.logarithmic,
-                "guessed": origin.guessed,
+                # A velocity of half of a rise has no range.
+                "guessed": origin.guessed or origin.origin == "default",
             }
         )
     return values
