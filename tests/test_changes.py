@@ -10,7 +10,7 @@ import pytest
 import walkers
 from tests.conftest import call, document, to_toml
 from walkers import load_case
-from walkers.inputs.config_table import replaced_keys
+from walkers.inputs.config_table import changed, replaced_keys
 from walkers.inputs.keys import settings_of, written
 from walkers.inputs.reading import shipped
 from walkers.inputs.sweep import expand, load_sweep
@@ -97,6 +97,43 @@ def test_changes_that_belong_together_do_not_replace_each_other() -> None:
     assert replaced_keys(CaseFile, tables, changes) == {
         "boundary.shape": ["boundary.mesh", "boundary.scale"]
     }
+
+
+TABLE = {
+    "contact.friction.bead_wall.at_rest": 0.1,
+    "contact.friction.bead_wall.rise": 0.4,
+    "contact.friction.bead_wall.half_rise_velocity": "20 mm/s",
+}
+"""All keys of a table of friction."""
+NUMBER = {"contact.friction.bead_wall": 0.25}
+
+
+def test_a_table_of_friction_and_a_number_replace_each_other() -> None:
+    with_number = {"contact": {"friction": {"bead_wall": 0.5}}}
+    (number_key,) = NUMBER
+    assert replaced_keys(CaseFile, with_number, TABLE) == {key: [number_key] for key in TABLE}
+    with_table = changed(CaseFile, with_number, TABLE)
+    assert replaced_keys(CaseFile, with_table, NUMBER) == {number_key: sorted(TABLE)}
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        pytest.param({"contact.friction.bead_wall.rise": 0.4}, id="a part alone"),
+        pytest.param({**NUMBER, **TABLE}, id="number and table"),
+        pytest.param({"contact.friction.bead_wall": 0.3}, id="another number"),
+    ],
+)
+def test_what_replaces_no_number_is_not_told_to_replace_it(changes: dict[str, Any]) -> None:
+    """The first two are refused where they are made."""
+    assert replaced_keys(CaseFile, {"contact": {"friction": {"bead_wall": 0.5}}}, changes) == {}
+
+
+def test_the_program_tells_in_a_line_that_a_table_replaces_a_number(in_folder: Path) -> None:
+    changes = [f"--set={key}={value}" for key, value in TABLE.items()]
+    done = call("show", "climber", *changes, check=True)
+    line = f"walkers: {', '.join(TABLE)} replace contact.friction.bead_wall of the case\n"
+    assert done.stderr == line
 
 
 @pytest.mark.parametrize(

@@ -178,13 +178,19 @@ def print_lines(lines: Iterable[object]) -> None:
 def tell_replaced(replaced: Mapping[str, Sequence[str]]) -> None:
     """Tell which keys of a case the keys of ``--set`` replace, a line for each of these.
 
+    Keys that replace the same, such as those of a table in the place of a number, share a line.
+
     Parameters
     ----------
     replaced
         The replaced keys by the keys that replace them.
     """
+    replacing: dict[tuple[str, ...], list[str]] = {}
     for key, former in replaced.items():
-        tell(f"{key} replaces {', '.join(former)} of the case")
+        replacing.setdefault(tuple(former), []).append(key)
+    for former_keys, keys in replacing.items():
+        verb = "replaces" if len(keys) == 1 else "replace"
+        tell(f"{', '.join(keys)} {verb} {', '.join(former_keys)} of the case")
 
 
 @contextmanager

@@ -80,6 +80,11 @@ def value_text(case: Mapping[str, Any], key: str) -> str:
     return f"{at_rest} + {text_of(rise)} v/(v + {velocity})"
 
 
+def without_parts(keys: Sequence[str]) -> list[str]:
+    """Keys without those whose values `value_text` writes in the value of another one of them."""
+    return [key for key in keys if key.rpartition(".")[0] not in keys]
+
+
 @cache
 def quantity_kind(key: str) -> QuantityKind | None:
     """The kind of quantity of a key, such as ``dimers.radii[0]``; None for pure numbers."""

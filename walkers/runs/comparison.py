@@ -16,6 +16,8 @@ from math import hypot, isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from walkers.inputs.keys import is_below
+from walkers.inputs.units import with_symbols
 from walkers.physics.laws import LAWS
 from walkers.postprocess.measure.numbers import (
     NOT_SHOWN_ALONE,
@@ -35,7 +37,7 @@ from walkers.postprocess.measure.quantities import (
 from walkers.postprocess.measure.results import Results, json_numbers, not_computed, read_results
 from walkers.rounding import counted, rounded
 from walkers.runner.manifest import read_manifest
-from walkers.runs.case_text import differing, flattened, readable
+from walkers.runs.case_text import differing, flattened, value_text, without_parts
 from walkers.runs.draws import ComparedDraws, Draws, compare_draws
 from walkers.runs.draws_text import compared_draws_text
 from walkers.templates.deck import bridge_tables_digest
@@ -44,7 +46,6 @@ from walkers.text import aligned_blocks, with_unit
 
 if TYPE_CHECKING:
     from walkers.inputs.tables.case import Case
-from walkers.inputs.units import with_symbols
 
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
 """Numbers whose scatter is in the result."""
@@ -106,10 +107,14 @@ class Comparison:
 
 @dataclass(frozen=True)
 class _Parameter:
-    """A key whose values differ between the cases, with the values (SI) and where each is from."""
+    """A key whose values differ between the cases, with the values and where each is from.
+
+    The values are in SI units; the texts are those of the table.
+    """
 
     key: str
     values: Sequence[Any]
+    texts: Sequence[str]
     origin_words: Sequence[str | None]
 
 
@@ -195,6 +200,7 @@ def _differing_parameters(first: Case, second: Case) -> list[_Parameter]:
         parameter = _Parameter(
             key,
             values=[first_values.get(key), second_values.get(key)],
+            texts=[value_text(first_values, key), value_text(second_values, key)],
             origin_words=[
                 first_values.origin_words.get(key),
                 second_values.origin_words.get(key),
@@ -205,17 +211,24 @@ def _differing_parameters(first: Case, second: Case) -> list[_Parameter]:
 
 
 def _parameters_text(parameters: Sequence[_Parameter], names: Sequence[str]) -> str:
-    """A table of the parameters with the names of both sides as headings."""
+    """A table of the parameters with the names of both sides as headings.
+
+    A friction that grows with the velocity in one case alone has one row, with the sources of its
+    numbers.
+    """
     if not parameters:
         return "the cases are the same"
     rows = [["parameter", *names, "source"]]
-    for parameter in parameters:
-        values = [with_symbols(readable(parameter.key, value)) for value in parameter.values]
-        sources: list[str] = []
-        for word in parameter.origin_words:
-            if word and word not in sources:
-                sources.append(word)
-        rows.append([parameter.key, *values, " / ".join(sources)])
+    for key in without_parts([parameter.key for parameter in parameters]):
+        texts: list[str] = []
+        words: list[str | None] = []
+        for parameter in parameters:
+            if parameter.key == key:
+                texts = [with_symbols(text) for text in parameter.texts]
+            if parameter.key == key or is_below(parameter.key, key):
+                words += parameter.origin_words
+        sources = dict.fromkeys(word for word in words if word)
+        rows.append([key, *texts, " / ".join(sources)])
     return aligned_blocks(rows, table_width())
 
 

@@ -31,6 +31,7 @@ from walkers.runs.case_text import (
     flattened,
     short_keys,
     value_text,
+    without_parts,
 )
 from walkers.runs.conditions import Condition
 from walkers.runs.making import progress_at
@@ -404,5 +405,5 @@ def by_case(runs: Sequence[ListEntry]) -> list[RunsOfCase]:
     groups = []
     for case, members in runs_of.items():
         given, derived = differing([run.parameters for run in members if run.parameters])
-        groups.append(RunsOfCase(case, members, given or derived))
+        groups.append(RunsOfCase(case, members, without_parts(given or derived)))
     return groups
