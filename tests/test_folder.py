@@ -580,8 +580,12 @@ def test_compared_cases_show_what_follows_from_their_materials() -> None:
     cells = {tuple(re.split("  +", line)) for line in text.splitlines()}
     assert cells >= {
         ("beads.material", "ruby", "glass", "given"),
-        ("contact.friction.bead_bead.rise", "3.5", "-", "calibrated"),
-        ("contact.friction.bead_bead", "-", "0.1", "guessed"),
+        (
+            "contact.friction.bead_bead",
+            "0.05 + 3.5 v/(v + 1000 mm/s)",
+            "0.1",
+            "calibrated / assumed / guessed",
+        ),
         ("contact.friction.bead_wall", "0.2", "0.25", "calibrated / guessed"),
         ("contact.roughness.bead_bead", "28.3 nm", "990 nm", "library"),
         ("liquid.volume_fraction", "-", "0.01", "guessed"),

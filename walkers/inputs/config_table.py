@@ -509,8 +509,10 @@ def replaced_keys(
     replaced: dict[str, list[str]] = {}
     for name, value in changes.items():
         excluded = alternatives(model, name, value) - changes.keys()
-        given = [key for key in excluded if value_at(document, parts_of(key)) is not MISSING]
-        given += _replaced_form(model, document, name, changes)
+        given = _replaced_form(model, document, name, changes)
+        for key in excluded:
+            if value_at(document, parts_of(key)) is not MISSING:
+                given.append(key)
         if given:
             replaced[name] = sorted(given)
     return replaced

@@ -178,11 +178,16 @@ def compare_runs(first: ComparedRun, second: ComparedRun) -> Comparison:
         if side.directory is None:
             paragraphs.append(f"{side.name}: no finished run; only the parameters are compared")
             not_run.append(side.name)
+    values = {}
+    sources = {}
+    for parameter in parameters:
+        values[parameter.key] = parameter.values
+        sources[parameter.key] = parameter.origin_words
     contents = {
         "first": first.name,
         "second": second.name,
-        "parameters": {parameter.key: parameter.values for parameter in parameters},
-        "sources": {parameter.key: parameter.origin_words for parameter in parameters},
+        "parameters": values,
+        "sources": sources,
         "not_run": not_run,
         "results": [json_numbers(asdict(number)) for number in numbers],
         "draws": asdict(draws) if draws else None,
@@ -219,17 +224,23 @@ def _parameters_text(parameters: Sequence[_Parameter], names: Sequence[str]) -> 
     if not parameters:
         return "the cases are the same"
     rows = [["parameter", *names, "source"]]
-    for key in without_parts([parameter.key for parameter in parameters]):
-        texts: list[str] = []
-        words: list[str | None] = []
-        for parameter in parameters:
-            if parameter.key == key:
-                texts = [with_symbols(text) for text in parameter.texts]
-            if parameter.key == key or is_below(parameter.key, key):
-                words += parameter.origin_words
-        sources = dict.fromkeys(word for word in words if word)
-        rows.append([key, *texts, " / ".join(sources)])
+    by_key = {parameter.key: parameter for parameter in parameters}
+    for key in without_parts(list(by_key)):
+        texts = map(with_symbols, by_key[key].texts)
+        rows.append([key, *texts, _sources_text(key, parameters)])
     return aligned_blocks(rows, table_width())
+
+
+def _sources_text(key: str, parameters: Sequence[_Parameter]) -> str:
+    """Where the values of a key and of its parts are from, those of the first case first."""
+    words: list[str] = []
+    for side in range(2):
+        for parameter in parameters:
+            word = parameter.origin_words[side]
+            is_of_key = parameter.key == key or is_below(parameter.key, key)
+            if is_of_key and word and word not in words:
+                words.append(word)
+    return " / ".join(words)
 
 
 def _has_other_bridge_tables(side: ComparedRun) -> bool:
