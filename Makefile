@@ -17,19 +17,19 @@ help: ## List the targets
 
 .PHONY: walker
 walker: setup ## Run the walker of Fig. 1b (or CASE=...): velocity, pictures, a film, ParaView files
-	@$(WALKERS) run $(CASE) --out $(OUT)
+	@$(WALKERS) run $(CASE) --runs $(OUT)
 	@echo "pictures:"
-	@$(WALKERS) plot $(CASE) --out $(OUT) | sed 's/^/  /'
-	@$(WALKERS) render $(CASE) --out $(OUT) | sed 's/^/  /'
+	@$(WALKERS) plot $(CASE) --runs $(OUT) | sed 's/^/  /'
+	@$(WALKERS) render $(CASE) --runs $(OUT) | sed 's/^/  /'
 	@echo "film:"
-	@$(WALKERS) render --film $(CASE) --size $(FILM) --out $(OUT) | sed 's/^/  /'
+	@$(WALKERS) render --film $(CASE) --size $(FILM) --runs $(OUT) | sed 's/^/  /'
 	@echo "for ParaView:"
-	@$(WALKERS) export $(CASE) --to vtk --out $(OUT) | sed 's/^/  /'
+	@$(WALKERS) export $(CASE) --format vtk --runs $(OUT) | sed 's/^/  /'
 
 .PHONY: sweep
 sweep: setup $(if $(SITE),.venv/with-cluster) ## Run what is missing of SWEEP=fig2 on all cores (SITE=cluster.toml: on that cluster), print its table
-	@$(WALKERS) sweep $(SWEEP) --out $(OUT) $(if $(SITE),--site $(SITE)) $(if $(JOBS),--jobs $(JOBS)); status=$$?; \
-	  [ $$status -gt 1 ] || $(WALKERS) list $(basename $(notdir $(SWEEP))) --out $(OUT); exit $$status
+	@$(WALKERS) sweep $(SWEEP) --runs $(OUT) $(if $(SITE),--site $(SITE)) $(if $(JOBS),--jobs $(JOBS)); status=$$?; \
+	  [ $$status -gt 1 ] || $(WALKERS) list $(basename $(notdir $(SWEEP))) --runs $(OUT); exit $$status
 
 .PHONY: pile
 pile: setup ## Shake the small pile until a cluster climbs (or PILE=pile-fig1a): pictures, a film; goes on where it was interrupted
@@ -37,11 +37,11 @@ pile: setup ## Shake the small pile until a cluster climbs (or PILE=pile-fig1a):
 
 .PHONY: figures
 figures: setup .venv/with-theory ## The paper's figures, and its facts beside ours, in figures/ (runs what is missing)
-	@.venv/bin/python -m studies.paper --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
+	@.venv/bin/python -m studies.paper --runs $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
 .PHONY: calibrate
 calibrate: setup .venv/with-calibrate ## Calibrate friction and drag to the published numbers (CALIBRATION=ruby); goes on where it was interrupted
-	@$(WALKERS) calibrate $(CALIBRATION) --out $(OUT) $(if $(JOBS),--jobs $(JOBS))
+	@$(WALKERS) calibrate $(CALIBRATION) --runs $(OUT) $(if $(JOBS),--jobs $(JOBS))
 
 # Tests start hundreds of Python processes; each would compile its imports where the environment forbids bytecode. Tests
 # that run beside others have no cores for the threads of NumPy's libraries.
@@ -75,7 +75,7 @@ audit: setup .venv/with-check ## Prove what the installed engine does, beside a 
 
 .PHONY: validate
 validate: setup .venv/with-check ## Check it against published benchmarks, exact solutions and a second engine (under ten minutes)
-	@.venv/bin/python -m studies.literature --out $(OUT)
+	@.venv/bin/python -m studies.literature --runs $(OUT)
 
 .PHONY: docs-pictures
 docs-pictures: setup .venv/with-dev ## Make what docs/ shows and is not of today's parameters: pictures, tables, outputs, numbers (ONLY=fig2: that)

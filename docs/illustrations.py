@@ -837,7 +837,7 @@ def output_of(command: str, out: Path) -> str:
         # The command prints the result of the run beside the models, if there is one.
         case = next(word for word in arguments if not word.startswith("-"))
         run(case, out)
-    words = [sys.executable, "-m", "walkers.main", name, *arguments, "--out", str(out)]
+    words = [sys.executable, "-m", "walkers.main", name, *arguments, "--runs", str(out)]
     if name == "run":
         words.append("--force")  # otherwise the output says that it was run already
     printed = subprocess.run(words, capture_output=True, text=True, check=True).stdout

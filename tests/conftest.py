@@ -9,11 +9,15 @@ import copy
 import fcntl
 import io
 import os
+import pty
+import re
 import runpy
 import shutil
 import signal
+import struct
 import subprocess
 import sys
+import termios
 import time
 import warnings
 from collections.abc import Callable, Iterator
@@ -86,6 +90,8 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 # MPI processes that wait for each other then let other processes run. On a busy machine, this makes
 # them ten times as fast.
+for name in ("COLUMNS", "NO_COLOR", "FORCE_COLOR", "WALKERS_RUNS"):  # those of the developer
+    os.environ.pop(name, None)
 os.environ["OMPI_MCA_mpi_yield_when_idle"] = "1"  # noqa: SIM112
 _LONGEST = (
     "through_slurm",
@@ -99,6 +105,8 @@ _LONGEST = (
 FillOnce = Callable[[str, Callable[[Path], object]], Path]
 """The type of the fixture `once`: the name of a folder, and what fills it; returns the folder."""
 T = TypeVar("T")
+ESCAPE = re.compile(r"\x1b\[[0-9;]*m")
+"""A sequence that switches colours."""
 PROGRAM = str(Path(sys.executable).with_name("walkers"))
 SHORT = {"cycles": 6, "settling_cycles": 2, "samples_per_cycle": 10}
 BRIEF = {
@@ -480,6 +488,29 @@ def _captured_stream() -> io.TextIOWrapper:
 def _text_of(stream: io.TextIOWrapper) -> str:
     """What was written to a captured stream."""
     return stream.buffer.getvalue().decode()  # type: ignore[attr-defined, no-any-return]
+
+
+def on_terminal(*arguments: str, folder: Path, columns: int = 80, **variables: str) -> str:
+    """What the program prints on a terminal of its own with so many columns."""
+    ours, theirs = pty.openpty()
+    fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    environment = {**os.environ, "TERM": "xterm-256color", **variables}
+    process = subprocess.Popen(
+        [PROGRAM, *arguments],
+        cwd=folder,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=theirs,
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(theirs)
+    output = b""
+    with suppress(OSError):  # the end of a terminal is an error
+        while part := os.read(ours, 65536):
+            output += part
+    os.close(ours)
+    assert process.wait() == 0
+    return output.decode().replace("\r\n", "\n")
 
 
 def call(

@@ -28,7 +28,7 @@ from walkers.inputs.case_building import build_case
 from walkers.runner.manifest import FileChanged, read_manifest
 from walkers.runner.model_sources import model_version
 from walkers.runner.provenance import software
-from walkers.runner.run_directory import leave_out_dumps
+from walkers.runner.run_directory import REQUESTED_NAME, leave_out_dumps
 from walkers.sweeps.table import load_table
 
 RECORD = "archive.json"
@@ -40,7 +40,7 @@ Once = Callable[[str, Callable[[Path], object]], Path]
 
 def _exported(directory: Path, archive: Path, *options: str) -> Path:
     """Export a run or a sweep as an archive; return the archive."""
-    call("export", str(directory), "--to", "archive", "-o", str(archive), *options, check=True)
+    call("export", str(directory), "--format", "archive", "-o", str(archive), *options, check=True)
     return archive
 
 
@@ -122,7 +122,7 @@ def test_manifests_have_the_checksums_and_sizes_of_all_files(run: Path) -> None:
     checksums = {}
     sizes = {}
     for path in run.rglob("*"):
-        if path.is_file() and path.name != "manifest.json":
+        if path.is_file() and path.name not in ("manifest.json", REQUESTED_NAME):
             name = path.relative_to(run).as_posix()
             checksums[name] = hashlib.sha256(path.read_bytes()).hexdigest()
             sizes[name] = path.stat().st_size
@@ -484,7 +484,7 @@ def test_a_sweep_that_is_not_finished_is_not_archived(
     sweep_without_runs: Path, tmp_path: Path
 ) -> None:
     archive = tmp_path / "again.zip"
-    refused = call("export", str(sweep_without_runs), "--to", "archive", "-o", str(archive))
+    refused = call("export", str(sweep_without_runs), "--format", "archive", "-o", str(archive))
     assert refused.returncode == 2
     assert "2 of 2 points are not finished" in refused.stderr
 
@@ -660,7 +660,7 @@ def _edited_deck(folder: Path) -> Path:
     """A deck that was edited and run by hand: the engine rescales its tables for the viscosity."""
     (folder / "case.toml").write_text(to_toml(document(run=SHORT)))
     directory = folder / "by-hand"
-    call("export", str(folder / "case.toml"), "--to", "deck", "-o", str(directory), check=True)
+    call("export", str(folder / "case.toml"), "--format", "deck", "-o", str(directory), check=True)
     deck = directory / "walker.lig"
     deck.write_text(re.sub(r"(variable +viscosity string) \S+", r"\1 0.01", deck.read_text()))
     subprocess.run(["sh", "run.sh"], cwd=directory, check=True)
@@ -921,7 +921,7 @@ def uncertain_names(uncertain_runs: Path) -> list[str]:
 def draw(uncertain_runs: Path, uncertain_names: list[str]) -> Path:
     """A draw of the spread of the second point; draws keep no tables of forces."""
     spread = load_table(uncertain_runs / f"{uncertain_names[1]}-spread")
-    draw = uncertain_runs / Path(spread["run"][0]).name
+    draw = uncertain_runs / f"{uncertain_names[1]}-spread" / Path(spread["run"][0]).name
     assert not list(draw.rglob("bridges.txt"))
     return draw
 
@@ -1007,7 +1007,7 @@ def test_archives_have_the_accuracy_of_their_run(
 
 def test_an_unpacked_run_tells_its_band(uncertain_copies: Path, uncertain_names: list[str]) -> None:
     printed = call("run", str(uncertain_copies / uncertain_names[0]), check=True).stdout
-    assert re.search(r"velocity along the heading .* band [0-9.]+ to [0-9.]+", printed)
+    assert re.match(r"base: velocity .* mm/s, band [0-9.]+ to [0-9.]+", printed)
 
 
 def test_an_archive_of_a_sweep_has_its_bands(

@@ -1320,10 +1320,10 @@ def test_a_name_of_another_kind(command: str, message: str) -> None:
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ("export --to deck {sweep}", "is a sweep's directory: walkers list"),
+        ("export --format deck {sweep}", "is a sweep's directory: walkers list"),
         ("render {sweep}", "is a sweep: expected one of its runs"),
         ("climb {sweep}", "expected a finished run of a pile"),
-        ("export {sweep} --to archive --every 2", "--every: is for --to vtk, lammps"),
+        ("export {sweep} --format archive --every 2", "--every: is for --format vtk, lammps"),
     ],
 )
 def test_the_directory_of_a_sweep_in_place_of_a_run(
@@ -1350,7 +1350,8 @@ def test_an_archive_in_place_of_a_run(command: str, archive: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["plot", "render --film", "report", "export --to lammps", "export --to archive"]
+    "command",
+    ["plot", "render --film", "report", "export --format lammps", "export --format archive"],
 )
 def test_what_needs_a_finished_run_names_the_command_that_makes_it(command: str) -> None:
     assert_refused(f"{command} fig1b", "no finished run in runs; first do: walkers run fig1b")
@@ -1499,7 +1500,7 @@ def test_names_of_the_library_that_are_similar_are_proposed(command: str, messag
         ("run", "CASE"),
         (
             "export fig1b",
-            "--to requires an argument. Choose from: deck, vtk, lammps, archive. "
+            "--format requires an argument. Choose from: deck, vtk, lammps, csv, archive. "
             "See: walkers export --help",
         ),
         ("check fig1b --without magic", "--without magic: expected one of"),
@@ -1554,11 +1555,11 @@ def test_a_picture_or_report_of_a_run(command: str, message: str, finished_run: 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--to vtk --licence MIT", "--licence: is for --to archive"),
-        ("--to vtk --every 0", "--every: 0: expected 1 or more"),
-        ("--to archive -o run.tar", "-o: expected the name of a .zip file"),
-        ("--to archive --licence ' '", "--licence: expected a licence such as CC-BY-4.0"),
-        ("--to archive --author N --author ''", "--author: expected names that are not empty"),
+        ("--format vtk --licence MIT", "--licence: is for --format archive"),
+        ("--format vtk --every 0", "--every: 0: expected 1 or more"),
+        ("--format archive -o run.tar", "--to: expected the name of a .zip file"),
+        ("--format archive --licence ' '", "--licence: expected a licence such as CC-BY-4.0"),
+        ("--format archive --author N --author ''", "--author: expected names that are not empty"),
     ],
 )
 def test_options_of_an_export(options: str, message: str, finished_run: Path) -> None:

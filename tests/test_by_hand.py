@@ -112,7 +112,7 @@ def test_a_deck_run_by_hand_says_so(finished: Path) -> None:
     assert "(already run)" not in run.describe()
 
 
-@pytest.mark.parametrize("command", ["run", "plot", "export --to vtk", "check files"])
+@pytest.mark.parametrize("command", ["run", "plot", "export --format vtk", "check files"])
 def test_a_deck_run_by_hand_is_a_run_for_commands(finished: Path, command: str) -> None:
     run_case(finished)
     assert call(*command.split(), str(finished)).returncode == 0
@@ -385,7 +385,7 @@ def test_a_deck_that_is_edited_after_its_run_is_reported(finished: Path) -> None
 
 def test_a_deck_run_by_hand_is_not_taken_for_a_run_with_other_values(finished: Path) -> None:
     run_case(finished)
-    with pytest.raises(InputError, match=r"no finished run in .*--set 'drive.frequency=70 Hz'"):
+    with pytest.raises(InputError, match=r"no finished run in .*'drive.frequency': '70 Hz'"):
         walkers.load(finished, changes={"drive.frequency": "70 Hz"})
 
 

@@ -681,7 +681,7 @@ def test_the_program_says_why_an_engine_is_refused_and_what_to_do(own_cache: Pat
     (message,) = done.stderr.splitlines()
     assert "failed its audit in 1 line(s), first: Hertz force" in message
     assert f"walkers check engine --engine {find_engine().path}" in message
-    assert "another binary by --engine or WALKERS_ENGINE" in message
+    assert "another binary by --engine (in Python engine=) or WALKERS_ENGINE" in message
     assert not (own_cache / "runs").exists()
 
 

@@ -773,6 +773,7 @@ def test_a_sweep_of_piles_and_a_run_by_itself_are_two_conditions_of_a_table(
     assert written["condition"].drop_duplicates().tolist() == ["starts", run]
     upper = GARWOOD[0][1] / starts.table()["driven"].sum()
     assert written["rate_high"].tolist()[:3] == pytest.approx([upper] * 3, rel=1e-4)
+    assert written["guessed"].str.contains("friction.bead_wall 0.25", regex=False).all()
 
 
 def test_the_climbs_of_a_sweep_of_piles_are_drawn_without_a_warning(
@@ -794,6 +795,7 @@ def test_the_climbs_of_a_sweep_of_piles_rest_on_the_frictions_that_were_guessed(
     assert len(guessed) == 2
     for line in guessed:
         assert "friction.bead_wall 0.25" in line
+        assert line.endswith(" (not of these materials and this liquid)")
 
 
 def test_a_sweep_of_piles_that_lacks_points_is_printed_with_a_warning(

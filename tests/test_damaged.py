@@ -183,9 +183,9 @@ READERS: dict[str, set[str]] = {
     "run {run}": {"case"},
     "plot {run}": {"case", "result", "tables"},
     "report {run} --to out.html": {"case", "result", "tables", "beads", "bridges"},
-    "export {run} --to vtk -o vtk": {"case", "result", "beads", "bridges"},
-    "export {run} --to lammps -o out.lammpstrj": {"case", "result", "beads"},
-    "export {run} --to archive -o out.zip": {"case", "result", "tables", "beads", "bridges"},
+    "export {run} --format vtk -o vtk": {"case", "result", "beads", "bridges"},
+    "export {run} --format lammps -o out.lammpstrj": {"case", "result", "beads"},
+    "export {run} --format archive -o out.zip": {"case", "result", "tables", "beads", "bridges"},
     "compare {run} {run}": {"case", "result"},
 }
 """Commands that are given a run, and which parts of it they read."""
@@ -285,7 +285,7 @@ def test_a_damaged_result_or_table_is_made_anew_from_the_dumps(name: str, parts:
     """By `run`; then the run can be archived again."""
     DAMAGES[name].apply(parts)
     call("run", str(parts), check=True)
-    call("export", "--to", "archive", str(parts), "-o", "out.zip", check=True)
+    call("export", "--format", "archive", str(parts), "-o", "out.zip", check=True)
 
 
 @dataclass(frozen=True)
@@ -654,9 +654,9 @@ WAYS_TO_READ = [
     "show {run}",
     "compare {run} {run}",
     "plot {run}",
-    "export {run} --to lammps -o out.lammpstrj",
-    "export {run} --to vtk -o vtk",
-    "export {run} --to archive -o out.zip",
+    "export {run} --format lammps -o out.lammpstrj",
+    "export {run} --format vtk -o vtk",
+    "export {run} --format archive -o out.zip",
     "run {run}",
 ]
 
@@ -779,7 +779,9 @@ def test_a_file_system_without_locks_is_named_with_advice(short_case: Path, tmp_
     done = _program([PROGRAM, "run", "short.toml"], {"LD_PRELOAD": library})
     assert done.returncode == 2
     (line,) = (line for line in _own_lines(done.stderr) if "ERROR: ld.so" not in line)
-    assert re.search(r"runs: files cannot be locked \(No locks available\): .*--out", line)
+    assert re.search(
+        r"^walkers: runs: files cannot be locked \(No locks available\): .*--runs", line
+    )
 
 
 @pytest.mark.parametrize(
@@ -830,8 +832,8 @@ def finished_sweep(in_folder: Path, once: Once) -> Path:
         ("run short.toml --out {disk}/a", 1),
         ("sweep sweep.toml --out {disk}/c", 2),
         ("plot runs/sweep --to {disk}/d.png", 2),
-        ("export --to vtk {run} -o {disk}/e", 2),
-        ("export --to deck {run} -o {disk}/deck", 2),
+        ("export --format vtk {run} -o {disk}/e", 2),
+        ("export --format deck {run} -o {disk}/deck", 2),
         ("render {run} --images 1 --to {disk}/f.png", 2),
         ("list runs/sweep --to {disk}/g.csv", 2),
     ],
@@ -1179,7 +1181,7 @@ def test_a_sweep_may_have_an_odd_path(odd_folder: Path) -> None:
 def test_a_run_may_have_an_odd_path(short_case: Path) -> None:
     """And is plotted and exported."""
     short_case.rename(short_case.with_name(f"{ODD}.toml"))
-    for command in ("run", "plot", "export --to vtk"):
+    for command in ("run", "plot", "export --format vtk"):
         done = call(*command.split(), f"./{ODD}.toml", "--out", f"./{ODD}", check=True)
         assert "Traceback" not in done.stderr
     assert not list(short_case.parent.rglob("executed"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
@@ -25,6 +26,7 @@ from walkers.physics.friction import SlidingFriction
 from walkers.postprocess.measure.uncertainty import uncertain_value_lines, uncertain_values
 from walkers.runner.binary import find_engine
 from walkers.runs.case_text import flattened
+from walkers.runs.comparison import ComparedRun, compare_runs
 from walkers.runs.listing import ListEntry, by_case
 from walkers.second_engine import scenes
 from walkers.second_engine.engine import SecondEngine
@@ -587,8 +589,38 @@ def test_a_list_of_runs_shows_a_number_and_a_growing_friction_in_one_column() ->
     (runs_of_case,) = by_case(runs)
     head, first, second = runs_of_case.as_text().splitlines()
     column = head.index("bead_wall")
-    assert first[column:].startswith("0.25 ")
+    assert first[column:].split() == ["0.25"]
     assert second[column:].startswith("0.1 + 0.4 v/(v + 20 mm/s)")
+    assert "rise" not in head
+
+
+@pytest.mark.parametrize(
+    ("changes", "row"),
+    [
+        ({AT_WALL: table(LAW)}, [AT_WALL, "0.25", "0.1 + 0.4 v/(v + 20 mm/s)", "given"]),
+        (
+            {AT_WALL: 0.25, BETWEEN_BEADS: 0.1},
+            [BETWEEN_BEADS, "0.05 + 3.5 v/(v + 1000 mm/s)", "0.1", "calibrated / assumed / given"],
+        ),
+    ],
+)
+def test_a_comparison_shows_a_number_and_a_growing_friction_in_one_row(
+    changes: Mapping[str, Any], row: list[str]
+) -> None:
+    first = ComparedRun("first", load_case("fig1b", {AT_WALL: 0.25}), None)
+    second = ComparedRun("second", load_case("fig1b", changes), None)
+    comparison = compare_runs(first, second)
+    table_of_parameters, _, _ = comparison.text.partition("\n\n")
+    (line,) = table_of_parameters.splitlines()[1:]
+    assert re.split(" {2,}", line) == row
+    assert f"{row[0]}.rise" in comparison.contents["parameters"]
+
+
+def test_a_comparison_of_two_growing_frictions_shows_the_number_that_differs() -> None:
+    cases = [load_case("fig1b", {AT_WALL: table(LAW._replace(rise=rise))}) for rise in (0.4, 0.5)]
+    comparison = compare_runs(*[ComparedRun(str(case.name), case, None) for case in cases])
+    (line,) = comparison.text.partition("\n\n")[0].splitlines()[1:]
+    assert line.split() == [f"{AT_WALL}.rise", "0.4", "0.5", "given"]
 
 
 @pytest.mark.parametrize(("liquid", "head"), [("Si AK5", "assumed"), ("glycerol 87 %", "guessed")])

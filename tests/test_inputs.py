@@ -22,7 +22,7 @@ from walkers.inputs.config_table import changed
 from walkers.inputs.origins import Origin
 from walkers.inputs.reading import load_case, shipped
 from walkers.inputs.resolving.library import library_of, unmeasured
-from walkers.inputs.resolving.loads import gravity_warnings
+from walkers.inputs.resolving.plausibility import drive_warnings, gravity_warnings
 from walkers.inputs.sweep import expand
 from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.units import parse_quantity, quantity_text
@@ -750,6 +750,84 @@ def test_beads_that_are_heavier_than_the_force_of_their_bridge_alone_are_reporte
     """The weight grows as R³ and the force as R: for ruby in silicone oil they equal at 1.2 mm."""
     case = load_case("fig1b", {"dimers.radii": [f"{radius_mm} mm", "1 mm"]})
     assert len(gravity_warnings(case)) == warnings
+
+
+SLOPE = {"boundary.tilt": "90 deg", "boundary.uphill": "0 deg"}
+"""A wall."""
+
+
+def hanging(radius_mm: float, **changes: str) -> Case:
+    """A dimer of ruby beads of similar size in silicone oil."""
+    radii = [f"{radius_mm} mm", f"{0.95 * radius_mm} mm"]
+    return load_case("fig1b", {"dimers.radii": radii, **changes})
+
+
+def test_walkers_on_a_slope_that_cannot_hang_from_one_bead_are_reported() -> None:
+    """A bridge between equal beads pulls with 2πγR at most, half of that to a plane.
+
+    Both beads are lighter than the pull of their bridges to the wall.
+    """
+    (warning,) = gravity_warnings(hanging(1.0, **SLOPE))
+    ratio = re.search(r"is ([\d.]+) times the pull", warning)
+    assert ratio is not None
+    weight = 4.0e3 * 9.81 * 4.0 / 3.0 * pi * 1e-3**3
+    assert float(ratio[1]) == pytest.approx(weight / (2.0 * pi * 19.2e-3 * 0.975e-3), rel=0.15)
+
+
+def test_the_slope_counts_by_the_sine_of_its_tilt() -> None:
+    assert gravity_warnings(hanging(1.0, **{"boundary.tilt": "10 deg"})) == []
+
+
+@pytest.mark.parametrize("radius_mm", [0.5, 0.7])
+def test_light_walkers_on_a_wall_are_not_reported(radius_mm: float) -> None:
+    assert gravity_warnings(hanging(radius_mm, **SLOPE)) == []
+
+
+def test_heavy_walkers_on_a_level_floor_do_not_hang() -> None:
+    assert gravity_warnings(hanging(1.0)) == []
+
+
+def test_loose_beads_that_cannot_hang_from_one_another_are_reported() -> None:
+    tables = document(run={"duration": "0.1 s"})
+    del tables["dimers"]
+    del tables["run"]["cycles"], tables["run"]["settling_cycles"]
+    placed = [
+        {"radius": "1 mm", "at": ["-3 mm", "0 mm", "1 mm"]},
+        {"radius": "1 mm", "at": ["3 mm", "0 mm", "1 mm"]},
+    ]
+    (warning,) = gravity_warnings(load_case({**tables, "placed": placed}))
+    assert "none hangs from another" in warning
+
+
+@pytest.mark.parametrize("name", sorted(shipped("case")))
+def test_drives_of_shipped_cases_are_plausible(name: str) -> None:
+    assert drive_warnings(load_case(name)) == []
+
+
+@pytest.mark.parametrize(
+    ("frequency", "texts"),
+    [
+        ("900 Hz", []),
+        ("2 kHz", ["2 kHz"]),
+        ("80 kHz", ["80 kHz", "0.155 nm to either side, less than the roughness"]),
+        ("0.08 Hz", ["155 m to either side"]),
+        ("4 Hz", []),
+    ],
+)
+def test_a_frequency_in_another_unit_is_reported_with_its_consequence(
+    frequency: str, texts: list[str]
+) -> None:
+    """The amplitude of 4 g at 80 Hz is 155 um; it falls with the square of the frequency."""
+    warnings = drive_warnings(load_case("fig1b", {"drive.frequency": frequency}))
+    assert len(warnings) == len(texts)
+    for warning, text in zip(warnings, texts, strict=True):
+        assert text in warning
+
+
+def test_a_slow_drive_below_the_roughness_is_reported() -> None:
+    case = load_case("fig1b", {"drive.peak_acceleration": "0.001 g"})
+    (warning,) = drive_warnings(case)
+    assert "38.8 nm to either side, less than the roughness of the surfaces, 39.4 nm" in warning
 
 
 def test_a_case_keeps_its_tables_if_the_caller_changes_them() -> None:

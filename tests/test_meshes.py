@@ -624,9 +624,16 @@ def test_names_of_walls_of_a_block_are_unique() -> None:
 
 # --- what is told -------------------------------------------------------------------------------
 def shown_vessel(boundary: dict[str, Any]) -> str:
-    """The line of ``walkers show`` about the vessel of a case."""
-    lines = preview_text(summarise(build_case(poured(**boundary)))).splitlines()
-    return next(line for line in lines if line.startswith("vessel"))
+    """The lines of ``walkers show`` about the vessel of a case, as one."""
+    text = preview_text(summarise(build_case(poured(**boundary))))
+    _, _, after = text.partition("\nvessel ")
+    first, *others = after.splitlines()
+    lines = [f"vessel {first}"]
+    for line in others:
+        if not line.startswith(" " * 11):
+            break
+        lines.append(line.strip())
+    return " ".join(lines)
 
 
 def test_show_tells_opening_height_and_volume() -> None:

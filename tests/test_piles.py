@@ -581,7 +581,7 @@ def output_of(*command: str) -> str:
 
 
 def test_the_program_prints_the_numbers_of_a_pile(pile_run: Path) -> None:
-    printed = output_of("run", str(pile_run))
+    printed = output_of("run", str(pile_run), "-v")
     assert re.search(r"\n  beads +60\n(.*\n)*  bridges per bead to others, at rest ", printed)
 
 
@@ -611,7 +611,7 @@ def test_a_pile_is_exported_to_vtk(pile_run: Path, motion: Motion, in_folder: Pa
     """Every fourth frame of the drive; the box is 4 mm wide and 20 mm high."""
     import pyvista as pv
 
-    arguments = ("--to", "vtk", "--every", "4", "-o", "here/vtk")
+    arguments = ("--format", "vtk", "--every", "4", "-o", "here/vtk")
     reader = pv.get_reader(output_of("export", str(pile_run), *arguments))
     driven = np.flatnonzero(motion.time >= 0.0)[::4]
     np.testing.assert_allclose(reader.time_values, motion.time[driven], atol=1e-12)
@@ -625,7 +625,7 @@ def test_a_pile_is_exported_to_vtk(pile_run: Path, motion: Motion, in_folder: Pa
 
 
 def test_a_deck_of_a_pile_explains_how_its_beads_come_to_rest(in_folder: Path) -> None:
-    deck = output_of("export", "pile-ci", "--to", "deck")
+    deck = output_of("export", "pile-ci", "--format", "deck")
     assert "in which the beads come to rest" in deck
 
 

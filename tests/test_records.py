@@ -175,7 +175,7 @@ def test_columns_that_are_left_out_are_noted(with_other_columns: Case) -> None:
 
 def test_show_notes_columns_that_are_left_out(with_other_columns: Case, tmp_path: Path) -> None:
     shown = call("show", "case.toml", folder=tmp_path, check=True).stdout
-    assert f"note       {NOTE_OF_COLUMNS}" in shown
+    assert f"note {NOTE_OF_COLUMNS}" in " ".join(shown.split())
     assert "ignored" not in shown
 
 
@@ -220,6 +220,28 @@ def test_an_impossible_displacement_is_noted(factor: float) -> None:
     """The unit of the time may be wrong."""
     time, x = sine_of(20)
     assert any("unit of the time" in note for note in record(factor * time, G * x).notes)
+
+
+@pytest.mark.parametrize(
+    ("factor", "cause"),
+    [
+        (1e-3, "seconds are taken for milliseconds"),
+        (1e3, "milliseconds are taken for seconds"),
+    ],
+)
+def test_the_likely_cause_of_a_wrong_unit_of_time_is_named(factor: float, cause: str) -> None:
+    time, x = sine_of(20)
+    made = record(factor * time, G * x)
+    (note,) = [note for note in made.notes if "unit of the time" in note]
+    assert cause in note
+    assert note in made.doubts  # of which the result warns
+
+
+def test_a_record_of_few_rows_a_second_is_noted() -> None:
+    """Of 0.4 g at 1 Hz, whose amplitude of 0.1 m a shaker might have."""
+    time = np.arange(0.0, 20.0, 1.0 / 15.0)
+    slow = record(time, 0.4 * G * np.sin(2.0 * pi * time))
+    assert any("15 rows a second" in note for note in slow.notes)
 
 
 def test_a_possible_displacement_is_not_noted() -> None:

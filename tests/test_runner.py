@@ -141,6 +141,7 @@ def test_a_run_directory_has_the_case_the_result_and_its_tables(
         "case.json",
         "cycles.parquet",
         "manifest.json",
+        "requested",
         "result.json",
         "segments",
         "trajectory.parquet",
@@ -1035,7 +1036,7 @@ def test_tables_of_an_edited_deck_have_decimal_points_in_any_language(
     awk.chmod(0o755)
     monkeypatch.setenv("PATH", f"{in_folder}/bin:{os.environ['PATH']}")
     monkeypatch.setenv("LC_ALL", "de_DE.UTF-8")
-    call("export", _case_file(in_folder, SHORT), "--to", "deck", "-o", "deck", check=True)
+    call("export", _case_file(in_folder, SHORT), "--format", "deck", "-o", "deck", check=True)
     deck = in_folder / "deck" / "walker.lig"
     deck.write_text(re.sub(r"(variable +viscosity string) \S+", r"\1 0.01", deck.read_text()))
     subprocess.run(["sh", "run.sh"], cwd=deck.parent, check=True)

@@ -695,7 +695,7 @@ def test_draws_of_a_spread_are_within_the_ranges(guessed_spread: Spread) -> None
 def test_a_printed_spread_names_its_values_and_its_median_once(guessed_spread: Spread) -> None:
     text = spread_text(guessed_spread)
     assert "contact_angle 0 deg (0 deg to 60 deg)" in text
-    held = "liquid.kinematic_viscosity 14.5 mm^2/s (ethylene glycol), contact."
+    held = "liquid.kinematic_viscosity 14.5 mm²/s (ethylene glycol), contact."
     assert held in " ".join(text.split())
     assert text.count("median") == 1
 

@@ -378,7 +378,7 @@ def recorded_run(
         call("sweep", "tensions.toml", "-j", "1", check=True)
         run = next((folder / "runs").glob("fig1b-*"))
         shown = {"as it was": call("show", str(run), check=True)}
-        exported = call("export", str(run), "--to", "deck", "-o", "deck", check=True)
+        exported = call("export", str(run), "--format", "deck", "-o", "deck", check=True)
         exists = {"as it was": first_case_has_a_run()}
         law.write_text(OWN_LAW.replace("4e-5", "9e-5"))
         shown["edited"] = call("show", str(run), check=True)

@@ -38,7 +38,12 @@ from walkers.postprocess.measure.results import (
     text,
 )
 from walkers.postprocess.measure.tables import read_columns
-from walkers.postprocess.measure.uncertainty import ACCURACY_NAME, SPREAD_NAME, spread_of
+from walkers.postprocess.measure.uncertainty import (
+    ACCURACY,
+    ACCURACY_NAME,
+    SPREAD_NAME,
+    spread_of,
+)
 from walkers.postprocess.measure.walking import _velocities
 from walkers.rounding import rounded
 from walkers.runs.case_text import quantity_kind
@@ -394,10 +399,9 @@ def test_walkers_that_came_apart_have_no_uncertainty_to_be_computed(
 def test_what_is_not_computed_stands_right_below_the_head_of_a_result(fig1b: walkers.Run) -> None:
     """Eight values of Fig. 1b have a range, and neither option has been used."""
     assert not_computed(fig1b.result) == NotComputed(uncertain_values=8, numerical_error=True)
-    _, second, *_ = fig1b.describe().splitlines()
-    assert second == (
-        "  uncertainty not computed: 8 uncertain values (--spread), numerical error (--accuracy)"
-    )
+    _, second, third, *_ = fig1b.describe().splitlines()
+    missing = "8 uncertain values (--spread), numerical error (--accuracy)"
+    assert f"{second} {third.strip()}" == f"  uncertainty not computed: {missing}"
 
 
 def test_scatter_of_copies_is_named_as_such(fig1b: walkers.Run) -> None:
@@ -408,7 +412,7 @@ MODEL_NOTE = "of uncertain values only; the error of the model is not in it"
 
 
 def test_a_result_without_a_band_has_no_note_about_bands(fig1b: walkers.Run) -> None:
-    assert MODEL_NOTE not in fig1b.describe()
+    assert MODEL_NOTE not in " ".join(fig1b.describe().split())
 
 
 def test_a_band_tells_that_it_leaves_out_the_error_of_the_model(fig1b: walkers.Run) -> None:
@@ -419,7 +423,7 @@ def test_a_band_tells_that_it_leaves_out_the_error_of_the_model(fig1b: walkers.R
         velocity_draws=32,
         velocity_approximate=False,
     )
-    assert MODEL_NOTE in text(result)
+    assert MODEL_NOTE in " ".join(text(result).split())
     assert "uncertain values (--spread)" not in text(result)
 
 
@@ -498,8 +502,13 @@ class MeasuredRun:
 
     @property
     def folder(self) -> Path:
-        """The folder with the run and with those that measured its errors."""
+        """The folder with the run."""
         return self.run.directory.parent
+
+    @property
+    def further_runs(self) -> Path:
+        """The folder with the runs that measured its errors."""
+        return self.run.directory.with_name(f"{self.run.directory.name}{ACCURACY}")
 
 
 def measured_once(once: FillOnce, name: str, case: Case) -> MeasuredRun:
@@ -555,7 +564,7 @@ def test_harder_beads_walk_slower_because_the_large_one_slides_more(
 @pytest.mark.slow
 def test_the_error_of_the_time_step_is_the_change_at_half_of_it(fast_walker: MeasuredRun) -> None:
     half_case = with_step_and_modulus(fig1b_at_90_hz(), 0.5, 1.0)
-    half = walkers.run(half_case, fast_walker.folder)
+    half = walkers.run(half_case, fast_walker.further_runs)
     assert half.cached  # it is one of the runs that measured the errors
     error = fast_walker.accuracy["errors"]["velocity"]
     change = half.result["velocity"] - fast_walker.run.result["velocity"]
@@ -570,7 +579,9 @@ def test_the_printed_result_has_the_numerical_error(fast_walker: MeasuredRun) ->
     assert result["numerical_error"] == total
     printed = printed_error(result, "velocity")
     assert f"numerical error {1e3 * total:.2g}" in printed
-    assert printed in fast_walker.run.describe()
+    assert printed in fast_walker.run.describe(verbose=True)
+    first, *_ = fast_walker.run.describe().splitlines()
+    assert f"mm/s, numerical error {1e3 * total:.2g}" in first
 
 
 @pytest.mark.slow
@@ -612,18 +623,18 @@ def test_numerical_errors_have_labels_and_stand_beside_their_numbers() -> None:
 def test_an_interrupted_accuracy_continues(tmp_path: Path) -> None:
     """It is interrupted when some of its runs are finished, which are not made again."""
     run = walkers.run(make_case(run=QUICK), tmp_path)
+    manifests = f"{run.directory.name}{ACCURACY}/*/manifest.json"
 
     def interrupt(_: object) -> None:
-        if len(list(tmp_path.glob("*/manifest.json"))) > 2:
+        if len(list(tmp_path.glob(manifests))) > 1:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         measure_accuracy(run.directory, SweepOptions(1), on_progress=interrupt)
     assert "velocity_error" not in run.result
     times = {}
-    for manifest in tmp_path.glob("*/manifest.json"):
-        if manifest.parent != run.directory:  # its own manifest lists the new accuracy.json
-            times[manifest] = manifest.stat().st_mtime_ns
+    for manifest in tmp_path.glob(manifests):
+        times[manifest] = manifest.stat().st_mtime_ns
     assert times
     run.accuracy()
     assert "velocity_error" in run.result
@@ -737,8 +748,8 @@ def hardest_steel(once: FillOnce) -> MeasuredRun:
 
 
 def test_errors_are_changes_at_half_the_step_and_with_harder_beads(steel: MeasuredRun) -> None:
-    half = walkers.run(with_step_and_modulus(steel.run.case, 0.5, 1.0), steel.folder)
-    hard = walkers.run(harder(steel.run.case, 1.953125), steel.folder)
+    half = walkers.run(with_step_and_modulus(steel.run.case, 0.5, 1.0), steel.further_runs)
+    hard = walkers.run(harder(steel.run.case, 1.953125), steel.further_runs)
     assert half.cached
     assert hard.cached
     velocity = steel.run.result["velocity"]
@@ -759,7 +770,7 @@ def test_the_error_of_beads_that_cannot_be_harder_is_that_of_the_time_step(
     hardest_steel: MeasuredRun,
 ) -> None:
     half_case = with_step_and_modulus(hardest_steel.run.case, 0.5, 1.0)
-    half = walkers.run(half_case, hardest_steel.folder)
+    half = walkers.run(half_case, hardest_steel.further_runs)
     assert half.cached
     change = half.result["velocity"] - hardest_steel.run.result["velocity"]
     error = hardest_steel.accuracy["errors"]["velocity"]

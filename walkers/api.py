@@ -7,7 +7,6 @@ files: each function calls the room that does the work.
 from __future__ import annotations
 
 import shlex
-import warnings
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -19,12 +18,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from walkers import DEFAULT_OUT
-from walkers.errors import InputError, Problem, apply_all, check_utf8, expected_of, input_error
+from walkers.errors import (
+    InputError,
+    Problem,
+    apply_all,
+    check_is_path,
+    check_limits,
+    check_utf8,
+    expected_of,
+    input_error,
+)
 from walkers.files import read_json
+from walkers.inputs.keys import written
 from walkers.inputs.sweep import load_sweep
+from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.measure.results import Results, ensure_measured, read_results
 from walkers.postprocess.measure.results import text as result_text
+from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.postprocess.measure.tables import read_table
 from walkers.postprocess.show.drawing import FORMATS, check_place, save_figure
 from walkers.postprocess.show.figures import plot_run
@@ -55,6 +66,7 @@ from walkers.runs.names import (
 )
 from walkers.runs.status import state_at, worst_status
 from walkers.sweeps.accuracy import measure_accuracy
+from walkers.sweeps.against_first import compare_points
 from walkers.sweeps.climbing import conditions_in, summarise_climbs
 from walkers.sweeps.climbing_output import write_climbs
 from walkers.sweeps.figure import column_of, figure_of
@@ -63,9 +75,17 @@ from walkers.sweeps.record import SweepRecord, read_sweep_record
 from walkers.sweeps.report import report_sweep
 from walkers.sweeps.scheduler import SweepOptions, run_sweep
 from walkers.sweeps.site import load_site
-from walkers.sweeps.spread import Spread, figures_of_spread, run_spread
+from walkers.sweeps.spread import (
+    Spread,
+    check_number_of_draws,
+    draws_of,
+    figures_of_spread,
+    run_spread,
+)
 from walkers.sweeps.table import SweepTable, aligned_table, describe_status, table_of
 from walkers.sweeps.workers import Failure
+from walkers.terminal import table_width
+from walkers.warning import warn_user
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -76,15 +96,15 @@ if TYPE_CHECKING:
 
     from walkers.calibration.calibrate import Outcome
     from walkers.inputs.origins import Origin
-    from walkers.inputs.tables.case import Case
 
-Export = Literal["deck", "vtk", "lammps", "archive"]
+Export = Literal["deck", "vtk", "lammps", "csv", "archive"]
 """Forms of exports."""
 
 _OPTIONS_OF_FORMS: Mapping[str, tuple[str, ...]] = {
     "deck": (),
     "vtk": ("every",),
     "lammps": ("every",),
+    "csv": ("units",),
     "archive": ("dumps", "authors", "licence"),
 }
 """Options of `Run.export` that each form takes."""
@@ -146,14 +166,28 @@ def _run_of_case(named: Reference) -> Run:
     if run_directory.is_finished(place) or is_begun(place):
         return Run(place, requested=case)
     name = str(named.given) if isinstance(named.given, (str, Path)) else case.name
+    missing = f"no finished run in {named.folder}; first do"
     command = f"walkers run {name}"
     for key, value in named.changes.items():
-        command += f" --set {shlex.quote(f'{key}={value}')}"
-    raise input_error(name, f"no finished run in {named.folder}; first do: {command}")
+        command += f" --set {shlex.quote(f'{key}={written(value)}')}"
+    raise input_error(name, f"{missing}: {_call_that_runs(named)}", f"{missing}: {command}")
+
+
+def _call_that_runs(named: Reference) -> str:
+    """The call of Python that runs the case of a name, with its changes."""
+    case = "case"  # the name of a variable of the user, which has the case or its tables
+    if named.kind == "run":
+        case = f'walkers.load("{named.path}").case'
+    elif isinstance(named.given, (str, Path)):
+        case = f'"{named.given}"'
+    if named.changes:
+        case = f"walkers.load_case({case}, {dict(named.changes)})"
+    folder = "" if named.folder == DEFAULT_OUT else f', "{named.folder}"'
+    return f"walkers.run({case}{folder})"
 
 
 def directory_of(
-    reference: str | Path, out: str | Path = DEFAULT_OUT, changes: Changes = None
+    reference: str | Path | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None
 ) -> Path:
     """The directory that a user names, whatever it contains.
 
@@ -198,6 +232,24 @@ class Run:
     requested
         The case that was asked for. None: the case that made the run, whose numbers may have other
         sources.
+    status : str
+        ``finished``, ``running``, ``interrupted`` or ``failed``.
+    progress : Progress or None
+        Completed ``share``, from 0 to 1, and ``text`` of a running run.
+    case : Case
+        The resolved case; its values are in SI units (``run.case.drive.frequency``, Hz).
+    origins : tuple of Origin or None
+        Sources of the values of the requested case.
+    result : Results
+        Numbers in SI units by name, and ``warnings``; a dictionary.
+    motion : Motion
+        Positions (m), velocities (m/s) and spins (rad/s) of all beads, arrays of shape (F, N, 3) of
+        F frames and N beads.
+    trajectory, walkers : pandas.DataFrame
+        Tables of the run in SI units: a row per sample and walker, and a row per walker. `table`
+        reads the others.
+    finished_directory : Path
+        The directory; `InputError` unless the run is finished.
     """
 
     directory: Path
@@ -236,7 +288,15 @@ class Run:
     def finished_directory(self) -> Path:
         """The directory of a finished run; otherwise `InputError`."""
         if not run_directory.is_finished(self.directory):
-            raise input_error(self.directory, f"the run is {self._state}")
+            state = f"the run is {self._state}"
+            call = f'walkers.run("{self.directory}")'
+            command = f"walkers run {self.directory}"
+            if self.status == "running":
+                raise input_error(self.directory, state)
+            again = "continue it with"
+            raise input_error(
+                self.directory, f"{state}; {again}: {call}", f"{state}; {again}: {command}"
+            )
         return self.directory
 
     @property
@@ -248,14 +308,14 @@ class Run:
 
     @property
     def _state(self) -> str:
-        """The status of an unfinished run, and how to continue it."""
+        """The status of an unfinished run, with its progress or the reason of its failure."""
         status = self.status
         if status == "running":
             progress = self.progress
             return f"running: {progress.text}" if progress else "running"
         failure = self._files / run_directory.FAILURE_NAME
         reason = f": {read_json(failure).get('message')}" if failure.is_file() else ""
-        return f"{status}{reason}; continue it with: walkers run {self.directory}"
+        return f"{status}{reason}"
 
     @cached_property
     def case(self) -> Case:
@@ -264,27 +324,50 @@ class Run:
 
     @property
     def origins(self) -> tuple[Origin, ...] | None:
-        """Sources of the values of the requested case; None: of the case that made the run."""
+        """Sources of the values of the requested case; None: of the case that made the run.
+
+        Each has the dotted ``key``, the ``value`` in SI units, its ``text``, and where it is from
+        (``origin``, ``source``, ``range``).
+        """
         return None if self.requested is None else self.requested.origins
 
     @property
     def result(self) -> Results:
-        """The result: numbers in SI units by name, with bands and numerical errors if measured."""
+        """The result: numbers in SI units by name, with bands and numerical errors if measured.
+
+        Returns
+        -------
+        walkers.postprocess.measure.results.Results
+            A dictionary; its ``warnings`` are reasons to doubt the numbers. The reference of tables
+            says what each number means.
+        """
         return read_results(self.finished_directory, self.origins)
 
     @property
     def motion(self) -> Motion:
-        """Positions, velocities and spins of all beads as arrays; also of an unfinished run."""
+        """Positions, velocities and spins of all beads as arrays; also of an unfinished run.
+
+        Returns
+        -------
+        walkers.postprocess.measure.motion.Motion
+            Arrays of shape (F, N, 3) of F frames and N beads, in m, m/s and rad/s, and ``time``,
+            shape (F,), s.
+
+        Raises
+        ------
+        DumpError
+            If a dump was left out, as in spreads and calibrations, or cannot be read.
+        """
         return read_motion(self._files)
 
     @property
     def trajectory(self) -> pd.DataFrame:
-        """One row per sample and walker, in SI units."""
+        """The table ``trajectory``: one row per sample and walker, in SI units."""
         return self.table("trajectory")
 
     @property
     def walkers(self) -> pd.DataFrame:
-        """One row per walker, in SI units."""
+        """The table ``walkers``: one row per walker, in SI units."""
         return self.table("walkers")
 
     def table(self, name: str) -> pd.DataFrame:
@@ -302,11 +385,17 @@ class Run:
         """
         return read_table(self.finished_directory, name)
 
-    def describe(self) -> str:
-        """The result as text in mm, mm/s and degrees; of an unfinished run, its progress."""
+    def describe(self, *, verbose: bool = False) -> str:
+        """The result as text in mm, mm/s and degrees; of an unfinished run, its progress.
+
+        Parameters
+        ----------
+        verbose
+            Whether to write all numbers, and all values that have not been measured.
+        """
         if not run_directory.is_finished(self.directory):
             return f"{self.directory.name}: {self._state}"
-        return result_text(self.result, cached=self.cached)
+        return result_text(self.result, cached=self.cached, verbose=verbose)
 
     def _repr_html_(self) -> str:
         """The result in a notebook: a table with errors, units and warnings, and the parameters."""
@@ -441,7 +530,7 @@ class Run:
         Parameters
         ----------
         to
-            The file; default: ``report.html`` in the run directory.
+            The file; default: ``report.html`` in the run directory. Missing folders are made.
 
         Returns
         -------
@@ -451,7 +540,7 @@ class Run:
         Raises
         ------
         InputError
-            If the file is not an HTML file in an existing folder.
+            If the file is not an HTML file, or its folder cannot be made.
 
         Examples
         --------
@@ -544,6 +633,7 @@ class Run:
         to: str | Path | None = None,
         *,
         every: int | None = None,
+        units: UnitSystem | None = None,
         dumps: bool = True,
         authors: Sequence[str] = (),
         licence: str | None = None,
@@ -554,13 +644,16 @@ class Run:
         ----------
         form
             ``deck``: the LIGGGHTS deck of the case. ``vtk``: files for ParaView. ``lammps``: the
-            trajectory as a LAMMPS dump. ``archive``: a zip file with checksums, to publish.
+            trajectory as a LAMMPS dump. ``csv``: all tables and the numbers of the result as CSV
+            files, with units in their headers. ``archive``: a zip file with checksums, to publish.
         to
-            The file, for ``vtk`` and ``deck`` a folder. Default: in the run directory, for
+            The file, for ``vtk``, ``csv`` and ``deck`` a folder. Default: in the run directory, for
             ``archive`` and ``deck`` in the current folder.
         every
             ``vtk``, ``lammps``: write every Nth sample; default: one per cycle; for ``lammps`` and
             piles all.
+        units
+            ``csv``: ``SI``, or ``mm`` for mm, mm/s, g (9.8 m/s²), µN, nJ and degrees; default: SI.
         dumps
             ``archive``: whether to include the dumps of the engine.
         authors
@@ -571,7 +664,8 @@ class Run:
         Returns
         -------
         Path
-            The written file; for ``deck`` and ``vtk`` the main file in the folder.
+            The written file; for ``deck`` and ``vtk`` the main file in the folder, for ``csv`` the
+            folder.
 
         Raises
         ------
@@ -586,6 +680,8 @@ class Run:
         chosen = []
         if every is not None:
             chosen.append("every")
+        if units is not None:
+            chosen.append("units")
         if not dumps:
             chosen.append("dumps")
         if authors:
@@ -606,6 +702,10 @@ class Run:
             from walkers.postprocess.show.lammps import write_trajectory
 
             return write_trajectory(directory, place, every=every)
+        if form == "csv":
+            from walkers.postprocess.show.csv_tables import write_csv
+
+            return write_csv(directory, place, units=units or "SI")
         from walkers.archive.writing import write_archive
 
         return write_archive(directory, place, dumps=dumps, authors=authors, licence=licence)
@@ -631,11 +731,16 @@ def check_export(form: str, options: Sequence[str] = ()) -> None:
     for option in options:
         if option not in _OPTIONS_OF_FORMS[form]:
             forms = [name for name, taken in _OPTIONS_OF_FORMS.items() if option in taken]
-            raise input_error(option, f"is for --to {', '.join(forms)}")
+            names = ", ".join(forms)
+            raise input_error(option, f"is for the form {names}", f"is for --format {names}")
 
 
 def _path(to: str | Path | None) -> Path | None:
-    return None if to is None else Path(to)
+    """The path of an argument ``to``; raises `InputError` if it is neither text nor a path."""
+    if to is None:
+        return None
+    check_is_path("to", to)
+    return Path(to)
 
 
 def run(
@@ -653,32 +758,43 @@ def run(
 
     Parameters
     ----------
-    case
-        A case (resolved, tables, file or shipped name), a run, by its name or directory, or the
-        folder of a deck that was run by hand.
-    out
-        Folder of the run directories.
-    engine
-        Name or path of the binary; default: the installed one
-        (`walkers.runner.binary.find_engine`).
-    force
-        Run again. The old run is replaced when the new one is finished.
-    progress
-        Show the progress; None: only in notebooks.
-    time_limit
-        Limit of the wall time in s for each segment of the run.
+    case : Case, str, Path or mapping
+        A case (resolved by `load_case`, the tables of a case file, a file or the name of a shipped
+        case), a run, by its name or directory, or the folder of a deck that was run by hand.
+    out : str or Path
+        Folder of the run directories; it is made if it does not exist.
+    engine : str, optional
+        Name or path of the binary; default: the environment variable ``WALKERS_ENGINE``, or the
+        installed one.
+    force : bool
+        Run again although a finished run exists. The old run is replaced when the new one is
+        finished.
+    progress : bool, optional
+        Show the progress; default: only in notebooks.
+    time_limit : float, optional
+        Limit of the wall time in s for each segment of the run; default: none.
 
     Returns
     -------
     Run
-        The finished run.
+        The finished run. Its ``cached`` tells whether it existed before.
 
     Raises
     ------
     InputError
-        If the case cannot be used.
+        If the case or another argument cannot be used.
     EngineFailure
-        If the engine fails or is missing, or another process is running the case.
+        If the engine fails or is missing, or another process is running the case. The classes that
+        derive from it tell the reason; `TimeLimitExceeded`, for example, is one.
+    KeyboardInterrupt
+        If the user stops the run, which the same call continues.
+
+    Warns
+    -----
+    UnauditedEngineWarning
+        If nobody has compared the forces of this engine with the expected ones.
+    ExecutedLawWarning
+        If the case has a bridge law of the user, whose file is executed.
 
     Examples
     --------
@@ -690,6 +806,7 @@ def run(
     {'facing': [1, -1], 'steady': [True, True]}
     """
     named = find(case, out)
+    check_limits("time_limit", time_limit, 0.0)
     if not force:
         finished = finished_run_of(named)
         if finished:
@@ -701,6 +818,7 @@ def run(
     binary = find_engine(engine)
     place = run_directory.run_place(requested, binary, folder)
     if run_directory.is_finished(place) and not force:
+        run_directory.mark_as_requested(place)
         return _measured(Run(place, requested=requested))
     check_audit(binary)
     with progress_of(requested.name, progress) as advance:
@@ -709,6 +827,7 @@ def run(
         )
     if not runs:
         raise RunBusy("another process is still running this case", run_directory.unfinished(place))
+    run_directory.mark_as_requested(place)
     return Run(place, cached=not runs[place.name], requested=requested)
 
 
@@ -789,7 +908,7 @@ class Sweep:
     @cached_property
     def runs(self) -> list[Run]:
         """The runs of all points, finished or not."""
-        return [Run(self._record.out / name) for name in self._record.runs]
+        return [Run(place) for place in self._record.places]
 
     def table(self) -> pd.DataFrame:
         """The table of the sweep, one row per point.
@@ -823,8 +942,8 @@ class Sweep:
 
     def describe(self) -> str:
         """The status of the points, their failures, and the table in mm, mm/s, nJ and degrees."""
-        frame = self._table.frame
-        return f"{describe_status(frame)}\n\n{aligned_table(frame.drop(columns='run'))}"
+        frame = self._table.frame.drop(columns="run")
+        return f"{describe_status(frame)}\n\n{aligned_table(frame, table_width())}"
 
     def _repr_html_(self) -> str:
         """The table in a notebook."""
@@ -839,6 +958,10 @@ class Sweep:
         panels: str | None = None,
         log: Log | None = None,
         theory: bool = False,
+        data_files: str | Path | Sequence[str | Path] = (),
+        width: str | None = None,
+        font_size: float | None = None,
+        title: str | None = None,
     ) -> Figure:
         """Make a matplotlib figure of a column of the table.
 
@@ -859,6 +982,18 @@ class Sweep:
             log-uniformly always is.
         theory
             Also draw the predictions of the theory.
+        data_files
+            Files with points of your own, such as measured ones, each as its path or as
+            ``LABEL=PATH``. The header names the columns like the axes, with units that are
+            converted to those of the axes: ``peak_acceleration (g)``, ``velocity (mm/s)``; columns
+            ``velocity error (mm/s)`` have error bars.
+        width
+            Width of the figure, such as ``85mm``; default: 7 inches. The height follows.
+        font_size
+            Size of all texts in points; default: 8, and 7 of tick labels and legends.
+        title
+            Text above the figure, or ``none``; default: the title of the sweep, and what its bars
+            and bands are.
 
         Returns
         -------
@@ -869,14 +1004,26 @@ class Sweep:
         Raises
         ------
         InputError
-            If a key or column does not exist, or no point is finished.
+            If a key, column or file does not exist, a unit is not understood, or no point is
+            finished.
 
         Examples
         --------
         >>> walkers.sweep("fig4", tmp).figure(x="liquid.name", log="y").axes[0].get_yscale()
         'log'
         """
-        options = FigureOptions(x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)
+        options = FigureOptions(
+            x=x,
+            y=y,
+            hue=hue,
+            panels=panels,
+            log=log,
+            theory=theory,
+            data_files=[data_files] if isinstance(data_files, (str, Path)) else data_files,
+            width=width,
+            font_size=font_size,
+            title=title,
+        )
         if in_notebook():
             import matplotlib.pyplot as plt
 
@@ -894,6 +1041,10 @@ class Sweep:
         panels: str | None = None,
         log: Log | None = None,
         theory: bool = False,
+        data_files: str | Path | Sequence[str | Path] = (),
+        width: str | None = None,
+        font_size: float | None = None,
+        title: str | None = None,
     ) -> Pictures:
         """Plot a column of the table to a file.
 
@@ -902,7 +1053,7 @@ class Sweep:
         to
             The file, .png, .svg or .pdf; default: a PNG in the directory of the sweep, named after
             the column.
-        x, y, hue, panels, log, theory
+        x, y, hue, panels, log, theory, data_files, width, font_size, title
             What the figure shows, see `figure`.
 
         Returns
@@ -915,7 +1066,18 @@ class Sweep:
         InputError
             If a key or column does not exist, no point is finished, or the format is another one.
         """
-        options = FigureOptions(x=x, y=y, hue=hue, panels=panels, log=log, theory=theory)
+        options = FigureOptions(
+            x=x,
+            y=y,
+            hue=hue,
+            panels=panels,
+            log=log,
+            theory=theory,
+            data_files=[data_files] if isinstance(data_files, (str, Path)) else data_files,
+            width=width,
+            font_size=font_size,
+            title=title,
+        )
         table = self._table
         place = _path(to) or self.directory / f"{column_of(table.frame, y)}.png"
         check_place(place, *(f".{form}" for form in FORMATS))
@@ -930,7 +1092,8 @@ class Sweep:
         Parameters
         ----------
         to
-            The file; default: ``report.html`` in the directory of the sweep.
+            The file; default: ``report.html`` in the directory of the sweep. Missing folders are
+            made.
 
         Returns
         -------
@@ -971,7 +1134,14 @@ class Sweep:
 
         if form != "archive":
             text = f"is a sweep: expected one of its runs for {form}, or archive"
-            raise input_error(self.directory, text)
+            if form != "csv":
+                raise input_error(self.directory, text)
+            command = f"walkers list {self.directory} --to table.csv"
+            raise input_error(
+                self.directory,
+                f"{text}; its table is given by table()",
+                f"{text}; for its table: {command}",
+            )
         return write_archive(
             self.directory, _path(to), dumps=dumps, authors=authors, licence=licence
         )
@@ -1001,28 +1171,32 @@ def sweep(
 
     Parameters
     ----------
-    sweep
-        A sweep file, the name of a shipped sweep, or the tables of a sweep file.
-    out
+    sweep : str, Path or mapping
+        A sweep file, the name of a shipped sweep, or the tables of a sweep file:
+        ``{"case": "fig1b", "axes": {"drive.frequency": ["70 Hz", "80 Hz"]}}``. A sweep of tables is
+        named ``sweep@`` and a digest of them.
+    out : str or Path
         Folder of the run directories, and of that of the sweep.
-    jobs
-        Number of parallel decks; default: one per core.
-    changes
-        Values that replace those in ``[set]``, by dotted keys.
-    progress
-        Show the progress; None: only in notebooks.
-    site
-        The site file of a cluster, TOML or Python; see `walkers.sweeps.site.load_site`.
-    executor
+    jobs : int, optional
+        Number of parallel decks, 1 or more; default: one per core.
+    changes : mapping, optional
+        Values that are added to ``[set]`` or replace those there, by dotted keys.
+    progress : bool, optional
+        Show the progress; default: only in notebooks.
+    site : str or Path, optional
+        The site file of a cluster, TOML or Python; see `walkers.sweeps.site.load_site`. Default:
+        this machine.
+    executor : concurrent.futures.Executor, optional
         Runs the decks instead of threads of this process, ``jobs`` at the same time. All of its
         workers must see the folder ``out``.
-    time_limit
-        Limit of the wall time in s for each deck.
-    spread
-        Number of runs of each finished point with its uncertain values drawn from their ranges, for
-        bands along the sweep (columns such as ``velocity_low``); 0: none.
-    engine
-        Name or path of the binary; default: the installed one.
+    time_limit : float, optional
+        Limit of the wall time in s for each deck; default: none.
+    spread : int
+        Number of runs of each finished point with its uncertain values drawn from their ranges, 2
+        to 4096, for bands along the sweep (columns such as ``velocity_low``); 0: none.
+    engine : str, optional
+        Name or path of the binary; default: the environment variable ``WALKERS_ENGINE``, or the
+        installed one.
 
     Returns
     -------
@@ -1033,17 +1207,33 @@ def sweep(
     Raises
     ------
     InputError
-        If the sweep or one of its points cannot be used.
+        If the sweep, one of its points, or another argument cannot be used.
     EngineFailure
-        If there is no engine, or its audit failed.
+        If there is no engine, or its audit failed. Failures of points do not raise errors.
     SweepStopped
         If a failure affects every point.
+    KeyboardInterrupt
+        If the user stops the sweep, which the same call continues.
+
+    Warns
+    -----
+    UnauditedEngineWarning
+        If nobody has compared the forces of this engine with the expected ones.
+    SweepReplacedWarning
+        If another sweep of the same name, without common runs, was in the folder.
 
     Examples
     --------
     >>> walkers.sweep("fig4", tmp).table()[["liquid.name", "status"]].to_dict("list")
     {'liquid.name': ['Si AK5', 'Si AK10'], 'status': ['finished', 'finished']}
     """
+    check_is_path("out", out)
+    check_limits("jobs", jobs, 1, whole=True)
+    check_limits("time_limit", time_limit, 0.0)
+    if spread != 0:
+        check_number_of_draws(spread, "spread")
+    if site is not None:
+        check_is_path("site", site)
     points = load_sweep(sweep, changes)
     options = SweepOptions(jobs, load_site(Path(site)) if site else None, executor, time_limit)
     folder = Path(out).resolve() if site else Path(out)
@@ -1067,17 +1257,22 @@ def sweep(
 
 
 def compare(
-    first: str | Path,
-    second: str | Path | None = None,
+    first: str | Path | Reference,
+    second: str | Path | Reference | None = None,
     out: str | Path = DEFAULT_OUT,
     changes: Mapping[str, Any] | None = None,
 ) -> Comparison:
-    """Compare two runs or cases in parameters and results.
+    """Compare two runs or cases in parameters and results, or the points of a sweep.
+
+    If both cases have a spread, or the points of the sweep, this gives the bands of the difference
+    and of the ratio of the main number, for common and for independent unknowns
+    (`walkers.runs.draws`).
 
     Parameters
     ----------
     first, second
-        Runs or cases, named as for `load`. The second one is the first by default.
+        Runs or cases, named as for `load`. The second one is the first by default. A sweep by
+        itself: its points are compared with its first one.
     out
         Folder of the run directories.
     changes
@@ -1091,10 +1286,19 @@ def compare(
     Raises
     ------
     InputError
-        If neither a second run nor changes are given, or a case cannot be read.
+        If neither a second run nor changes are given, a case cannot be read, or the points of a
+        sweep have no spread.
     """
     if second is None and not changes:
-        raise input_error(first, "expected a second run, or changed values (--set KEY=VALUE)")
+        named = find(first, out)
+        if named.kind == "sweep":
+            return compare_points(Sweep(named.path)._table)
+        example = 'changes={"drive.frequency": "70 Hz"}'
+        raise input_error(
+            "compare",
+            f"expected a second run or case, or changes, such as {example}",
+            "expected a second run, or changed values (--set KEY=VALUE)",
+        )
     references = [
         find(first, out),
         find(first if second is None else second, out, changes),
@@ -1108,12 +1312,13 @@ def _side(named: Reference) -> ComparedRun:
     directory = named.finished_run
     is_run = named.kind == "run" and not named.means_case
     name = directory.name if directory and is_run else str(named.given)
-    changes = [f"{key}={value}" for key, value in named.changes.items()]
-    return ComparedRun(" ".join([name, *changes]), case, directory)
+    changes = [f"{key}={written(value)}" for key, value in named.changes.items()]
+    draws = draws_of(directory) if directory else None
+    return ComparedRun(" ".join([name, *changes]), case, directory, draws)
 
 
 def climb(
-    references: Sequence[str | Path],
+    references: Sequence[str | Path | Reference],
     out: str | Path = DEFAULT_OUT,
     changes: Changes = None,
     *,
@@ -1153,8 +1358,12 @@ def climb(
     InputError
         If a reference does not exist, a run is not one of a pile, or the file has another format.
     """
-    if to is not None:
-        check_place(Path(to), *(f".{form}" for form in FORMATS), ".csv")
+    check_limits("within", within, 0.0)
+    if isinstance(references, (str, Path)):
+        raise input_error(references, f'expected a list of names, such as ["{references}"]')
+    place = _path(to)
+    if place is not None:
+        check_place(place, *(f".{form}" for form in FORMATS), ".csv")
     climbs = []
     runs = []
     for run_or_sweep in apply_all(lambda name: load(name, out, changes), references):
@@ -1166,8 +1375,8 @@ def climb(
                 words.append(label)
             climbs.append(summarise_climbs(results, within) | {"condition": ", ".join(words)})
             runs += [result.directory.name for result in results]
-    if to is not None:
-        write_climbs(climbs, runs, Path(to))
+    if place is not None:
+        write_climbs(climbs, runs, place)
     return climbs
 
 
@@ -1186,7 +1395,7 @@ def _conditions(run_or_sweep: Run | Sweep) -> Iterator[tuple[str, list[Results]]
     missing = len(table.frame) - len(table.finished)
     if missing:
         text = f"{missing} of {len(table.frame)} points are not finished and left out"
-        warnings.warn(f"{directory.name}: {text}", stacklevel=3)
+        warn_user(f"{directory.name}: {text}")
     for label, rows in conditions_in(table.frame):
         yield label, table.results_of(rows)
 
@@ -1229,6 +1438,8 @@ def calibrate(
     from walkers.calibration import calibrate
     from walkers.calibration.file import load_calibration
 
+    check_is_path("out", out)
+    check_limits("jobs", jobs, 1, whole=True)
     return calibrate.calibrate(
         load_calibration(calibration),
         Path(out),
@@ -1238,7 +1449,9 @@ def calibrate(
     )
 
 
-def predict(case: Given, out: str | Path = DEFAULT_OUT, changes: Changes = None) -> dict[str, Any]:
+def predict(
+    case: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None
+) -> dict[str, Any]:
     """Predict the motion of the dimer of a case by the theory.
 
     Parameters

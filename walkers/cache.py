@@ -74,6 +74,9 @@ def make_cache_folder(name: str = "") -> Path:
         return folder
     inner = folder / name
     with _securing:
+        if inner.is_symlink() and not inner.exists():
+            target = inner.readlink()
+            raise OSError(f"{inner} is a link to {target}, which does not exist: remove the link")
         if os.path.lexists(inner) and not _is_safe_folder(inner):
             _forget(inner)
     inner.mkdir(mode=0o700, exist_ok=True)

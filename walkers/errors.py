@@ -9,9 +9,10 @@ from __future__ import annotations
 import difflib
 import json
 import os
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import inf
+from numbers import Integral, Real
 from pathlib import Path
 from typing import TypeVar
 
@@ -45,11 +46,15 @@ class Problem:
         The value as the user wrote it; None if there is none to quote.
     expected
         Describes right values.
+    in_command
+        What the program says instead of ``expected``, which speaks to Python users: options and
+        commands. None: the same.
     """
 
     key: str
     value: str | None
     expected: str
+    in_command: str | None = None
 
     def __str__(self) -> str:
         place = shortened(printable(self.key))
@@ -79,9 +84,20 @@ class InputError(WalkersError):
         source = shortened(printable(self.source), _LONGEST_TEXT)
         return "\n".join(f"{source}: {problem}" for problem in self.problems)
 
-    def renamed(self, name_of: Callable[[str], str]) -> InputError:
-        """The error with another name of its source, such as that of an option for an argument."""
-        return InputError(name_of(self.source), self.problems)
+    def in_command(self, name_of: Callable[[str], str]) -> InputError:
+        """The error in the words of the command line.
+
+        Parameters
+        ----------
+        name_of
+            Gives the name of the source on the command line, such as that of an option for an
+            argument.
+        """
+        problems = []
+        for problem in self.problems:
+            expected = problem.expected if problem.in_command is None else problem.in_command
+            problems.append(replace(problem, expected=expected))
+        return InputError(name_of(self.source), problems)
 
 
 class InputErrors(InputError):
@@ -112,14 +128,24 @@ class InputErrors(InputError):
         texts = [str(error) for error in self.errors]
         return "\n".join(dict.fromkeys(texts))
 
-    def renamed(self, name_of: Callable[[str], str]) -> InputErrors:
-        """The errors with other names of their sources."""
-        return InputErrors([error.renamed(name_of) for error in self.errors])
+    def in_command(self, name_of: Callable[[str], str]) -> InputErrors:
+        """The errors in the words of the command line."""
+        return InputErrors([error.in_command(name_of) for error in self.errors])
 
 
-def input_error(source: object, expected: str) -> InputError:
-    """The error of an unusable file, option or other source, with what is expected."""
-    return InputError(str(source), [Problem("", None, expected)])
+def input_error(source: object, expected: str, in_command: str | None = None) -> InputError:
+    """The error of an unusable file, option or other source, with what is expected.
+
+    Parameters
+    ----------
+    source
+        The file, option or argument.
+    expected
+        Describes right values.
+    in_command
+        What the program says instead (`Problem.in_command`).
+    """
+    return InputError(str(source), [Problem("", None, expected, in_command)])
 
 
 def key_error(key: str, expected: str, value: object = None) -> InputError:
@@ -176,12 +202,62 @@ def shortened(text: str, longest: int = _LONGEST_VALUE) -> str:
     return f"{text[: longest - 3]}..."
 
 
-def check_limits(name: str, value: float | None, low: float, high: float = inf) -> None:
-    """Raise `InputError` if an argument is not within its limits; None: it was not given."""
-    if value is None or low <= value <= high:
+def check_limits(
+    name: str, value: object, low: float = -inf, high: float = inf, *, whole: bool = False
+) -> None:
+    """Raise `InputError` if an argument is no number within its limits; None: it was not given.
+
+    Parameters
+    ----------
+    name
+        Name of the argument.
+    value
+        Its value.
+    low, high
+        Smallest and largest value.
+    whole
+        Whether only whole numbers are accepted.
+    """
+    if value is None:
         return
-    limits = f"{low:g} to {high:g}" if high < inf else f"{low:g} or more"
-    raise input_error(name, f"{value:g}: expected {limits}")
+    kind = "a whole number" if whole else "a number"
+    is_number = isinstance(value, Integral if whole else Real)
+    if not is_number or isinstance(value, bool):
+        raise input_error(name, f"{quoted(value)}: expected {kind}")
+    number = float(value)  # type: ignore[arg-type]
+    if low <= number <= high:
+        return
+    if high < inf:
+        limits = f"{low:g} to {high:g}"
+    elif low > -inf:
+        limits = f"{low:g} or more"
+    else:
+        limits = kind
+    raise input_error(name, f"{number:g}: expected {limits}")
+
+
+def check_is_path(name: str, value: object, expectation: str = "a path") -> None:
+    """Raise `InputError` if an argument is neither text nor a path.
+
+    Parameters
+    ----------
+    name
+        Name of the argument.
+    value
+        Its value.
+    expectation
+        What is expected, in words.
+    """
+    if not isinstance(value, (str, Path)):
+        raise input_error(name, f"{quoted(value)}: expected {expectation}")
+
+
+def check_changes(changes: object) -> None:
+    """Raise `InputError` if changes of a case are no values by dotted keys."""
+    if changes is None or isinstance(changes, Mapping):
+        return
+    example = 'values by dotted keys, such as {"drive.frequency": "70 Hz"}'
+    raise input_error("changes", f"{quoted(changes)}: expected {example}")
 
 
 def check_utf8(word: str | Path) -> None:

@@ -49,7 +49,7 @@ class ExtraMissing(InputError):
     def __str__(self) -> str:
         return f"{self.source} {self.problems[0]}"
 
-    def renamed(self, name_of: Callable[[str], str]) -> ExtraMissing:  # noqa: ARG002
+    def in_command(self, name_of: Callable[[str], str]) -> ExtraMissing:  # noqa: ARG002
         """The error itself: its source is a feature and not an argument."""
         return self
 

@@ -197,6 +197,8 @@ def make_folder(folder: Path) -> None:
 
 VTK_SCRATCH = ".vtk-"
 """Start of the names of the scratch folders of exports to VTK."""
+CSV_SCRATCH = ".csv-"
+"""Start of the names of the scratch folders of exports to CSV."""
 _FILLED = "new"
 """The only entry of a scratch folder: what is to be renamed."""
 _FILLED_BEFORE = "vtk"

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import textwrap
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from itertools import groupby
@@ -24,17 +24,18 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from walkers.commands import ALL_COMMANDS
 from walkers.errors import InputError, WalkersError, shortened
+from walkers.terminal import ERROR, HEADING, WARNING, message_text, styled
 from walkers.text import printable
 
 if TYPE_CHECKING:
     from cyclopts import App, CycloptsError
-    from cyclopts.help import HelpPanel
+    from cyclopts.help import HelpEntry, HelpPanel
 
 _SUMMARY = "Wet granular walkers, simulated with LIGGGHTS."
 """What the program is, in its help."""
 
 _OPTIONS = {
-    "--help, -h": "Display this message and exit.",
+    "--help, -h": "Display this message and exit. Of a command: walkers help COMMAND.",
     "--version": (
         "Show the versions of the package (with its commit, if known) and of the engine, and exit."
     ),
@@ -46,6 +47,9 @@ _OPTIONS = {
 
 _LARGEST_NAME_WIDTH = 24
 """Largest width of the first column of the help, characters."""
+
+_OLD_NAMES = ("--out", "-o")
+"""Earlier names of options, which help leaves out."""
 
 _HELP_WIDTH = 80
 """Width of the help, characters."""
@@ -105,7 +109,7 @@ def main(arguments: list[str] | None = None, app: App | None = None) -> NoReturn
 
 def _show_warning(message: object, *_position: object, **_options: object) -> None:
     """Print a warning as the program prints messages."""
-    print(f"walkers: warning: {message}", file=sys.stderr)
+    _print_message("walkers: warning:", str(message), WARNING)
 
 
 def _prepare_streams() -> None:
@@ -129,6 +133,8 @@ def _status(tokens: list[str], app: App | None = None) -> int:
     """Run the program, or another app, and return its exit status. Unexpected errors are raised."""
     try:
         outcome = None
+        if app is None and tokens[:1] == ["help"]:
+            tokens = [*tokens[1:], "--help"]
         if app is None and tokens in ([], ["--help"], ["-h"]):
             print_help()
         else:
@@ -145,7 +151,7 @@ def print_help() -> None:
 
     Without cyclopts and rich this takes a tenth of the time.
     """
-    print(f"Usage: walkers COMMAND [OPTIONS]\n\n{_SUMMARY}")
+    print(f"{styled('Usage:', HEADING)} walkers COMMAND [OPTIONS]\n\n{_SUMMARY}")
     for heading, group in groupby(ALL_COMMANDS, lambda command: command.heading):
         _print_panel(heading, {command.name: command.summary for command in group})
     _print_panel("Options", _OPTIONS)
@@ -157,7 +163,7 @@ def _print_panel(title: str, meanings: Mapping[str, str]) -> None:
         return
     width = min(_LARGEST_NAME_WIDTH, max(len(name) for name in meanings))
     margin = " " * (width + 4)
-    print(f"\n{title}:")
+    print(f"\n{styled(f'{title}:', HEADING)}")
     for name, meaning in meanings.items():
         first, *rest = textwrap.wrap(meaning, _HELP_WIDTH - len(margin)) or [""]
         if len(name) <= width:
@@ -170,12 +176,28 @@ def _print_panel(title: str, meanings: Mapping[str, str]) -> None:
 
 
 class _PlainHelp:
-    """Help of a command in plain text."""
+    """Help of a command in plain text.
+
+    Attributes
+    ----------
+    before_panels
+        Usage and description, until they are printed with the first panel: it has the names of the
+        arguments, which the usage of cyclopts lacks.
+    """
+
+    def __init__(self) -> None:
+        self.before_panels: list[str] = []
 
     def __call__(self, _console: object, _options: object, panel: HelpPanel) -> None:
+        if not panel.entries:
+            return
+        if self.before_panels:
+            usage, *description = self.before_panels
+            self.before_panels = []
+            print("\n".join([_complete_usage(usage, panel.entries), *description]))
         meanings = {}
         for entry in panel.entries:
-            names = ", ".join(entry.display_labels_with_metavar)
+            names = ", ".join(_labels(entry))
             meaning = _plain(entry.description)
             if entry.default not in (None, "False"):
                 meaning += f" [default: {entry.default}]"
@@ -184,11 +206,28 @@ class _PlainHelp:
 
     def render_usage(self, _console: object, _options: object, usage: Any) -> None:
         """Print how the command is called."""
-        print(f"Usage: {_plain(usage)}")
+        self.before_panels.append(f"{styled('Usage:', HEADING)} {_plain(usage)}")
 
     def render_description(self, _console: object, _options: object, description: Any) -> None:
         """Print what the command does."""
-        print(f"\n{textwrap.fill(_plain(description), _HELP_WIDTH)}")
+        self.before_panels.append(f"\n{textwrap.fill(_plain(description), _HELP_WIDTH)}")
+
+
+def _complete_usage(usage: str, entries: Iterable[HelpEntry]) -> str:
+    """A line of usage with the names of the arguments that need not be given, and with choices."""
+    optional = [entry for entry in entries if not entry.required]
+    arguments = [entry.display_labels[0] for entry in optional if entry.display_labels]
+    names = "] [".join(name for name in arguments if not name.startswith("-"))
+    return usage.replace("[ARGS...]", f"[{names}...]").replace("[ARGS]", f"[{names}]")
+
+
+def _labels(entry: HelpEntry) -> list[str]:
+    """The names of an option or argument, the last one with its choices or the kind of value."""
+    labels = [name for name in entry.display_labels if name not in _OLD_NAMES]
+    if entry.metavar and not entry.positional_label:
+        value = "|".join(entry.choices) if entry.choices else entry.metavar
+        labels[-1] += f" {value}"
+    return labels
 
 
 def _plain(text: Any) -> str:
@@ -303,7 +342,7 @@ def _report_own_stop(
         def name_of(source: str) -> str:
             return source if source in tokens else _options_of(source, tokens, app)
 
-        return _tell(str(stop.renamed(name_of)), _BAD_INPUT)
+        return _tell(str(stop.in_command(name_of)), _BAD_INPUT)
     return _tell(str(stop), _FAILED)
 
 
@@ -363,7 +402,8 @@ def _options_of(names: str, tokens: list[str], app: App) -> str:
     options = {}
     arguments = apps[-1].assemble_argument_collection()
     for argument in arguments:
-        options[argument.name.removeprefix("--")] = argument.name
+        if argument.field_info.name != "out":  # what is called runs is a folder, not the option
+            options[argument.name.removeprefix("--")] = argument.name
     for argument in arguments:
         options[argument.field_info.name] = argument.name
     return ", ".join(options.get(name, name) for name in names.split(", "))
@@ -371,8 +411,14 @@ def _options_of(names: str, tokens: list[str], app: App) -> str:
 
 def _tell(message: str, status: int) -> int:
     """Print a message, and return the status."""
-    print(f"walkers: {message}", file=sys.stderr)
+    _print_message("walkers:", message, ERROR)
     return status
+
+
+def _print_message(head: str, message: str, style: str) -> None:
+    """Print a message on standard error; its head has a style on a terminal."""
+    text = message_text(f"{head} {message}", sys.stderr)
+    print(styled(head, style, sys.stderr) + text[len(head) :], file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,9 @@ from contextlib import contextmanager
 from typing import NamedTuple, TextIO
 
 _BAR_LETTERS = 24
-"""Length of the bar."""
+"""Largest length of the bar."""
+_FEWEST_BAR_LETTERS = 4
+"""Smallest length of the bar, on narrow terminals."""
 _FIRST_LINE_SECONDS = 1.0
 """Time before the first line, where lines are not written in place."""
 _LONGEST_SILENCE_SECONDS = 60.0
@@ -87,11 +89,16 @@ def progress_of(name: str, shown: bool | None = True) -> Iterator[Tell | None]:
 
 
 def _show_in_place(name: str, stream: TextIO, width: int) -> Tell:
-    """A function that writes the progress over the line before, in a line of ``width`` letters."""
+    """A function that writes the progress over the line before, in a line of ``width`` letters.
+
+    The bar is as long as the text allows.
+    """
 
     def show(progress: Progress) -> None:
-        bar = "━" * round(_BAR_LETTERS * progress.share)
-        line = f"{name} {bar:─<{_BAR_LETTERS}} {progress.text}"
+        space = width - len(name) - len(progress.text) - 2
+        letters = min(_BAR_LETTERS, max(_FEWEST_BAR_LETTERS, space))
+        bar = "━" * round(letters * progress.share)
+        line = f"{name} {bar:─<{letters}} {progress.text}"
         print(f"\r{line[:width]:{width}}", end="", file=stream, flush=True)
 
     return show

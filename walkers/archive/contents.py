@@ -206,8 +206,15 @@ class _Packing:
         """Add a file that no manifest lists."""
         self.files[place] = ArchiveFile.of(source)
 
-    def add_run(self, directory: Path) -> str:
+    def add_run(self, directory: Path, folder: str = RUNS_FOLDER) -> str:
         """Add the files of a run's manifest, and its case file if that is known.
+
+        Parameters
+        ----------
+        directory
+            The run directory.
+        folder
+            The folder in the archive that contains that of the run.
 
         Returns
         -------
@@ -215,7 +222,7 @@ class _Packing:
             The folder of the run in the archive.
         """
         directory = directory.resolve()
-        place = f"{RUNS_FOLDER}/{directory.name}"
+        place = f"{folder}/{directory.name}"
         if place in self.manifests:
             return place
         manifest = read_manifest(directory)
@@ -276,16 +283,24 @@ class _Packing:
         """
         place = f"{RUNS_FOLDER}/{name}"
         table = load_table(record.directory)
-        table["run"] = [_place_of(run) for run in table["run"]]
+        folders = []
+        runs: dict[str, None] = {}
+        for state in states(record):
+            folder = ""
+            if state.directory:
+                # Draws of a spread are in its directory, in the archive too.
+                is_own = state.directory.parent == record.directory
+                parent = place if is_own else RUNS_FOLDER
+                folder = f"{parent}/{state.directory.name}"
+                if state.status == "finished":
+                    runs[self.add_run(state.directory, parent)] = None
+            folders.append(folder)
+        table["run"] = folders
         self.add(f"{place}/{RECORD_NAME}", record.directory / RECORD_NAME)
         for form in ("csv", "parquet"):
             self.add(f"{place}/table.{form}", encoded(table, form))
         tables_of_file = record.sweep.file
         self.add(f"{place}/{name}.toml", toml_bytes(tables_of_file))
-        runs: dict[str, None] = {}
-        for state in states(record):
-            if state.status == "finished" and state.directory:
-                runs[self.add_run(state.directory)] = None
         return list(runs)
 
     def add_companions(self, run: Path) -> None:
@@ -310,13 +325,6 @@ class _Packing:
         self.add(f"{MODEL_FOLDER}/build.sh", build_script().encode())
         script = resources.files("walkers.archive").joinpath(REPEAT_NAME)
         self.add(REPEAT_NAME, script.read_bytes())
-
-
-def _place_of(run: str) -> str:
-    """The folder in the archive of a run on this machine; empty for a point without a run."""
-    if not run:
-        return ""
-    return f"{RUNS_FOLDER}/{Path(run).name}"
 
 
 def _is_dump(name: str) -> bool:

@@ -17,10 +17,12 @@ from pathlib import Path
 from walkers.archive.contents import RECORD_FILE, SUMS_NAME
 from walkers.errors import input_error
 from walkers.runner.manifest import MANIFEST_NAME, checksums, read_manifest
-from walkers.runner.run_directory import CASE_NAME, SEGMENTS
+from walkers.runner.run_directory import CASE_NAME, REQUESTED_NAME, SEGMENTS
 from walkers.sweeps.record import RECORD_NAME, read_sweep_record, states
 from walkers.text import printable
 
+_NOT_COMPARED = (MANIFEST_NAME, SUMS_NAME, REQUESTED_NAME)
+"""Files that no list contains: the lists themselves, and a note for listings."""
 _READ_SUFFIXES = (".json", ".parquet", ".txt", ".lig", ".bin")
 """Suffixes of the files of a run that the program reads again."""
 _ZIP_ERRORS = (OSError, EOFError, RuntimeError, ValueError, zipfile.BadZipFile, zlib.error)
@@ -160,7 +162,7 @@ def _verify_folder(
     not_listed = []
     made_since = []
     for name in files:
-        if name in listed or name in (MANIFEST_NAME, SUMS_NAME):
+        if name in listed or name in _NOT_COMPARED:
             continue
         if _may_be_read(name):
             not_listed.append(name)

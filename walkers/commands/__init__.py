@@ -107,7 +107,8 @@ ALL_COMMANDS = (
         heading=_LOOK,
         place="walkers.commands.look:compare",
         summary=(
-            "Compare two runs or cases in parameters and results; --set changes the second case."
+            "Compare two runs or cases in parameters and results, or the points of a sweep "
+            "with its first; --set changes the second case."
         ),
     ),
     Command(
@@ -125,7 +126,7 @@ ALL_COMMANDS = (
         place="walkers.commands.keep:export",
         summary=(
             "Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, "
-            "or an archive to publish."
+            "CSV tables, or an archive to publish."
         ),
     ),
     Command(

@@ -15,10 +15,11 @@ from walkers.errors import input_error, suggestion
 from walkers.inputs.reading import shipped
 from walkers.inputs.resolving.library import HALF, Library, LibraryNumber, read_library, unmeasured
 from walkers.inputs.toml import read_toml
-from walkers.inputs.units import TEMPERATURE, quantity_text
+from walkers.inputs.units import TEMPERATURE, quantity_text, with_symbols
 from walkers.physics.laws import LAWS
 from walkers.physics.mixtures import MIXTURES
-from walkers.text import aligned
+from walkers.terminal import HEADING, fitted_lines, styled, table_width, wrapped
+from walkers.text import aligned_with_text
 
 _COLUMNS: Mapping[str, tuple[str, ...]] = {
     "materials": ("density", "youngs_modulus", "poissons_ratio", "roughness"),
@@ -125,7 +126,7 @@ def catalogue_text(entries: Sequence[Entry]) -> str:
     blocks = []
     for kind in _COLUMNS:
         if kind == "not measured":
-            blocks.append(NOT_KNOWN)
+            blocks.append("\n".join(wrapped(NOT_KNOWN.replace("\n", " "))))
         entries_of_kind = [entry for entry in entries if entry.kind == kind]
         blocks.append(_table(kind, entries_of_kind))
     return "\n\n".join(blocks)
@@ -135,14 +136,14 @@ def _table(kind: str, entries: Sequence[Entry]) -> str:
     """A table of the entries of a kind, with their notes in the last column."""
     columns = _COLUMNS[kind]
     heads = [_HEADS.get(column, column.replace("_", " ")) for column in columns]
-    rows = [[kind.capitalize(), *heads, ""]]
+    rows = [[styled(head, HEADING) for head in (kind.capitalize(), *heads, "")]]
     for entry in entries:
         cells = [_cell(entry.numbers, column) for column in columns]
         note = entry.text
         if entry.place:
             note += f" [{entry.place}]"
         rows.append([f"  {entry.name}", *cells, note.strip()])
-    return aligned(rows)
+    return aligned_with_text(rows, table_width())
 
 
 def _cell(numbers: Mapping[str, LibraryNumber], column: str) -> str:
@@ -151,10 +152,11 @@ def _cell(numbers: Mapping[str, LibraryNumber], column: str) -> str:
     for name in names:
         if name in numbers:
             number = numbers[name]
-            if not number.range:
-                return str(number.written)
-            low, high = number.range
-            return f"{number.written} ({low} to {high})"
+            text = str(number.written)
+            if number.range:
+                low, high = number.range
+                text += f" ({low} to {high})"
+            return with_symbols(text)
     return "-"
 
 
@@ -189,13 +191,14 @@ def _entry_lines(entry: Entry) -> list[str]:
         heading += f": {entry.text}"
     if entry.place:
         heading += f" [{entry.place}]"
-    lines = [heading]
+    lines = [fitted_lines([heading])]
     if entry.file:
         lines.append(f"  {entry.file}")
     if entry.kind in COMMANDS:
         lines.append(f"  walkers {COMMANDS[entry.kind]} {entry.name}")
-    width = max((len(key) for key in entry.numbers), default=0)
+    rows = []
     for key, number in entry.numbers.items():
-        cell = _cell(entry.numbers, key)
-        lines.append(f"  {key:{width}}  {cell:28}  {number.source}".rstrip())
+        rows.append([f"  {key}", _cell(entry.numbers, key), number.source])
+    if rows:
+        lines.append(aligned_with_text(rows, table_width()))
     return lines

@@ -17,6 +17,7 @@ from walkers.commands.options import (
     JsonOption,
     LookupOptions,
     OutOption,
+    QuietOption,
     RunOrSweepArgument,
     print_as,
     print_lines,
@@ -31,7 +32,10 @@ check = App(name="check", version_flags=(), group_parameters="Options")
 
 @check.command
 def engine(
-    *, only: list[str] | None = None, as_json: JsonOption = False, engine: EngineOption = None
+    *,
+    only: Annotated[list[str] | None, Parameter(metavar="NAME")] = None,
+    as_json: JsonOption = False,
+    engine: EngineOption = None,
 ) -> int:
     """Compare the forces of the engine and its contact model with a second engine and exact
     formulas.
@@ -39,7 +43,7 @@ def engine(
     Parameters
     ----------
     only
-        Run only the check with this name. Repeatable.
+        Run only the check with this name; a wrong one lists them. Repeatable.
     """
     from walkers.runner.binary import find_engine
     from walkers.second_engine.audit import record, run_audit
@@ -66,7 +70,7 @@ def files(name: RunOrSweepArgument, /, *, lookup: LookupOptions = LookupOptions(
     from walkers.api import directory_of
     from walkers.archive.verification import verify
 
-    parts = verify(directory_of(name, lookup.out, lookup.values))
+    parts = verify(directory_of(lookup.find(name)))
     print_lines(part.describe() for part in parts)
     return 0 if all(part.passed for part in parts) else 1
 
@@ -82,6 +86,7 @@ def case(
     seeds: Annotated[int, Parameter(validator=Number(gte=1))] = 1,
     as_json: JsonOption = False,
     engine: EngineOption = None,
+    quiet: QuietOption = False,
 ) -> int:
     """Run CASE with LIGGGHTS and with an independent second engine in Python, and compare the
     motion.
@@ -91,16 +96,16 @@ def case(
     cycles
         Number of drive cycles; default: as in the case.
     without
-        Leave out a force, such as friction. Repeatable.
+        Leave out a force: capillary, lubrication, damping, friction, rolling-friction, gravity or
+        drive. Repeatable.
     seeds
         Piles: number of random starts.
     """
-    from walkers.runs.names import find
     from walkers.second_engine.crosscheck import crosscheck, with_cycles
     from walkers.second_engine.engine import TERMS
     from walkers.second_engine.lines import as_dict, failures, lines_text
 
-    loaded = find(case, lookup.out, lookup.values).case
+    loaded = lookup.find(case).case
     terms = without or []
     refuse(
         "--seeds",
@@ -114,7 +119,7 @@ def case(
             loaded = with_cycles(loaded, cycles)
         except ValueError as error:
             raise input_error("--cycles", str(error)) from error
-    lines = crosscheck(loaded, lookup.out, terms, seeds=seeds, progress=True, engine=engine)
+    lines = crosscheck(loaded, lookup.out, terms, seeds=seeds, progress=not quiet, engine=engine)
     name = loaded.name
     print_as(
         as_json,
@@ -149,6 +154,7 @@ def calibrate(
     out: OutOption = DEFAULT_OUT,
     jobs: JobsOption = None,
     engine: EngineOption = None,
+    quiet: QuietOption = False,
 ) -> int:
     """Calibrate unknown parameters to measured or published values. An interrupted calibration
     continues.
@@ -161,7 +167,7 @@ def calibrate(
     from walkers.calibration.report import CALIBRATION_NAME, calibration_summary, write_outcome
     from walkers.files import read_json
 
-    outcome = walkers.calibrate(calibration, out, jobs=jobs, progress=True, engine=engine)
+    outcome = walkers.calibrate(calibration, out, jobs=jobs, progress=not quiet, engine=engine)
     for name, failures in outcome.failures.items():
         tell(f"{name}: {len(failures)} points failed")
     folder = out / outcome.calibration.name

@@ -15,9 +15,9 @@ from walkers import DEFAULT_OUT
 from walkers.api import Export, check_export, directory_of
 from walkers.commands.options import LookupOptions, OutOption, RunOrSweepArgument, refuse, tell
 from walkers.errors import apply_all
+from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.runner.run_directory import UNFINISHED
 from walkers.runs.by_hand import as_run, write_folder
-from walkers.runs.names import find
 from walkers.runs.removal import Removal, removal_text, remove, unfinished_in
 from walkers.sweeps.removal import removals_in
 from walkers.templates.deck import RUN_NAME, render_deck, single_segment
@@ -36,6 +36,8 @@ class ExportOptions:
     ----------
     every
         vtk, lammps: write every Nth sample; default: one per cycle; for lammps and piles all.
+    units
+        csv: SI, or mm for mm, mm/s, g (9.8 m/s^2), µN, nJ and degrees; default: SI.
     dumps
         archive: leave out the engine's dumps; tables and results are included.
     authors
@@ -45,6 +47,7 @@ class ExportOptions:
     """
 
     every: int | None = None
+    units: UnitSystem | None = None
     dumps: Annotated[bool, Parameter("--without-dumps")] = False
     authors: Annotated[list[str] | None, Parameter("--author")] = None
     licence: str | None = None
@@ -54,20 +57,21 @@ def export(
     name: RunOrSweepArgument,
     /,
     *,
-    form: Annotated[Export, Parameter("--to")],
-    to: Annotated[Path | None, Parameter("-o", metavar="PATH")] = None,
+    form: Annotated[Export, Parameter("--format", metavar="FORMAT")],
+    to: Annotated[Path | None, Parameter(("--to", "-o"))] = None,
     lookup: LookupOptions = LookupOptions(),
     options: ExportOptions = ExportOptions(),
 ) -> None:
-    """Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, or an archive
-    to publish.
+    """Write a run for other programs: LIGGGHTS deck, VTK for ParaView, LAMMPS dump, CSV tables, or
+    an archive to publish.
 
     Parameters
     ----------
     form
         Format of the export. deck: LIGGGHTS deck of the case. vtk: .vtu files, their .pvd, and the
         script show.py that shows them in ParaView. lammps: the trajectory as a LAMMPS dump, for
-        OVITO, ASE, MDAnalysis. archive: a zip file with checksums, to publish.
+        OVITO, ASE, MDAnalysis. csv: a folder of all tables, with units. archive: a zip file with
+        checksums, to publish.
     to
         File or folder to write; default: in the run's folder, archives in the current folder.
         Decks are printed.
@@ -85,6 +89,8 @@ def _given_options(options: ExportOptions) -> dict[str, Any]:
     given: dict[str, Any] = {}
     if options.every is not None:
         given["every"] = options.every
+    if options.units is not None:
+        given["units"] = options.units
     if options.dumps:  # the option is --without-dumps
         given["dumps"] = False
     if options.authors is not None:
@@ -96,7 +102,7 @@ def _given_options(options: ExportOptions) -> dict[str, Any]:
 
 def _export_deck(name: str, to: Path | None, lookup: LookupOptions) -> None:
     """Print the deck of a case, or write its folder; with the cycles that its finished run took."""
-    reference = find(name, lookup.out, lookup.values)
+    reference = lookup.find(name)
     case = as_run(reference.case, reference.finished_run)
     if to is None:
         print(render_deck(case, single_segment(case)).text, end="")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import webbrowser
 from pathlib import Path
 from typing import Annotated
 
@@ -14,15 +15,19 @@ from walkers.commands.options import (
     JsonOption,
     LookupOptions,
     OutOption,
+    QuietOption,
     RunArgument,
     RunOrSweepArgument,
     print_as,
     print_lines,
     refuse,
     refuse_any,
+    tell,
 )
+from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.postprocess.show.film_options import FilmOptions, Seconds
 from walkers.sweeps.figure_options import FigureOptions
+from walkers.terminal import table_width
 
 
 def list_(
@@ -31,8 +36,9 @@ def list_(
     *,
     out: OutOption = DEFAULT_OUT,
     every: Annotated[bool, Parameter("--all")] = False,
-    where: Annotated[list[str] | None, Parameter(metavar="KEY=VALUE")] = None,
+    where: Annotated[list[str] | None, Parameter(metavar="CONDITION")] = None,
     to: Path | None = None,
+    units: UnitSystem | None = None,
     as_json: JsonOption = False,
 ) -> None:
     """List runs and sweeps with status, result, age and size, or print the table of one sweep.
@@ -42,33 +48,43 @@ def list_(
     sweep
         A sweep (name or folder): print the status of its points and its table.
     every
-        Include the runs of sweeps.
+        Include the runs of sweeps, spreads and accuracies.
     where
-        Only runs with this value, such as "drive.frequency=80 Hz". Repeatable.
+        Only runs with this value or result, such as "drive.frequency=80 Hz" or "velocity>1mm/s".
+        Repeatable.
     to
         Write the table of the sweep, with units, to this file (.csv, .parquet, .json).
+    units
+        Units of --to: SI, or mm for mm, mm/s, g (9.8 m/s^2), µN, nJ and degrees; default: SI. Keys
+        that vary keep the units of the sweep file.
     """
     from walkers.runs.listing import select
     from walkers.sweeps import listing
 
+    refuse("--units", units is not None and to is None, "is for --to")
     if sweep is not None:
         refuse_any({"where": where, "all": every}, "is for folders, not for a sweep")
-        _list_points(sweep, out, to, as_json)
+        _list_points(sweep, out, to, units or "SI", as_json)
         return
     refuse("--to", to is not None, "expected a sweep, whose table is written")
     entries = listing.inventory(out)
     shown = entries if every else listing.without_members(entries)
     hidden = len(entries) - len(shown)
     if where:
-        runs = [entry for entry in entries if entry.kind == "run"]
-        shown = select(runs, where)
+        searched = entries if every else listing.without_draws(entries)
+        shown = select([entry for entry in searched if entry.kind == "run"], where)
         hidden = 0
-    print_as(as_json, lambda: listing.as_json(shown), lambda: listing.listing_text(shown, hidden))
+    print_as(
+        as_json,
+        lambda: listing.as_json(shown),
+        lambda: listing.listing_text(shown, hidden, table_width()),
+    )
 
 
-def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
+def _list_points(name: str, out: Path, to: Path | None, units: UnitSystem, as_json: bool) -> None:
     """Print the points of a sweep, or write its table."""
     from walkers.api import Sweep
+    from walkers.postprocess.measure.table_units import in_units
     from walkers.runs.names import find
     from walkers.sweeps import table
 
@@ -79,11 +95,12 @@ def _list_points(name: str, out: Path, to: Path | None, as_json: bool) -> None:
     refuse(
         name,
         kind != "sweep",
-        f"not a sweep: expected a folder with a sweep.json (walkers list --out {name}?)",
+        f"not a sweep: expected a folder with a sweep.json (walkers list --runs {name}?)",
     )
     sweep = Sweep(reference.path)
     if to is not None:
-        table.write_table_file(sweep.table(), to)
+        frame = sweep.table()
+        table.write_table_file(in_units(frame, units, frame.attrs["varied"]), to)
         print(to)
     elif as_json:
         print(table.encoded(sweep.table(), "json").decode(), end="")
@@ -106,11 +123,13 @@ def plot(
     Parameters
     ----------
     to
-        Runs: folder of the figures. Sweeps: file to write (.png, .pdf, .svg).
+        Runs: folder to write the figures to. Sweeps: file to write (.png, .pdf, .svg).
     """
     loaded = lookup.load(name)
     if isinstance(loaded, walkers.Run):
-        refuse_any(vars(options), "is for sweeps")
+        given = dict(vars(options))
+        given["data"] = given.pop("data_files")  # as the option is called
+        refuse_any(given, "is for sweeps")
         print_lines(loaded.plot(to, formats or ["png"]))
         return
     refuse("--format", bool(formats), "is for runs: a sweep's figure has the format of --to's name")
@@ -126,6 +145,7 @@ def render(
     images: int | None = None,
     film: bool = False,
     options: FilmOptions = FilmOptions(),
+    quiet: QuietOption = False,
 ) -> None:
     """Render pictures of a run at several times, or a film with --film.
 
@@ -140,7 +160,7 @@ def render(
     """
     if film:
         refuse("--images", images is not None, "is for pictures, not for --film")
-        print(lookup.run(run).film(to, progress=True, **vars(options)))
+        print(lookup.run(run).film(to, progress=not quiet, **vars(options)))
         return
     defaults = vars(FilmOptions(walker=options.walker))
     changed = {name: value != defaults[name] for name, value in vars(options).items()}
@@ -150,7 +170,12 @@ def render(
 
 
 def report(
-    name: RunOrSweepArgument, /, *, lookup: LookupOptions = LookupOptions(), to: Path | None = None
+    name: RunOrSweepArgument,
+    /,
+    *,
+    lookup: LookupOptions = LookupOptions(),
+    to: Path | None = None,
+    opened: Annotated[bool, Parameter("--open")] = False,
 ) -> None:
     """Write a self-contained HTML report: parameters, results, plots and a 3-D view of the motion.
 
@@ -158,31 +183,42 @@ def report(
     ----------
     to
         HTML file to write; default: report.html in the folder of the run or sweep.
+    opened
+        Also open the report in a browser.
     """
-    print(lookup.load(name).report(to))
+    path = lookup.load(name).report(to)
+    print(path)
+    if opened and not webbrowser.open(path.resolve().as_uri()):
+        tell(f"no browser was found; open {path} yourself")
 
 
 def compare(
-    first: RunArgument,
-    second: Annotated[str | None, Parameter(name="RUN")] = None,
+    first: RunOrSweepArgument,
+    second: Annotated[str | None, Parameter(name="OTHER")] = None,
     /,
     *,
     lookup: LookupOptions = LookupOptions(),
     as_json: JsonOption = False,
 ) -> None:
-    """Compare two runs or cases in parameters and results; --set changes the second case.
+    """Compare two runs or cases in parameters and results, or the points of a sweep with its first;
+    --set changes the second case.
 
     Parameters
     ----------
     second
         Another run or case, named in the same way; default: the first with the values of --set.
     """
-    comparison = walkers.compare(first, second, lookup.out, lookup.values)
+    second_case = None
+    if second is not None or lookup.changes:
+        second_case = lookup.find(second or first)
+    comparison = walkers.compare(first, second_case, lookup.out)
     print_as(as_json, lambda: comparison.contents, lambda: comparison.text)
 
 
 def climb(
-    *names: Annotated[RunOrSweepArgument, Parameter(help="Sweeps, runs or cases of piles.")],
+    *names: Annotated[
+        RunOrSweepArgument, Parameter(required=True, help="Sweeps, runs or cases of piles.")
+    ],
     lookup: LookupOptions = LookupOptions(),
     within: Seconds | None = None,
     to: Path | None = None,
@@ -201,6 +237,6 @@ def climb(
     """
     from walkers.sweeps.climbing_output import describe_climbs
 
-    refuse("RUN|SWEEP", not names, "expected sweeps, runs or cases of piles")
-    climbs = walkers.climb(names, lookup.out, lookup.values, within=within, to=to)
+    references = [lookup.find(name) for name in names]
+    climbs = walkers.climb(references, within=within, to=to)
     print_as(as_json, lambda: climbs, lambda: describe_climbs(climbs))

@@ -8,7 +8,9 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Mapping
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,15 +21,17 @@ from cyclopts.validators import Path as PathValidator
 
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import input_error
+from walkers.terminal import message_text
 
 if TYPE_CHECKING:
     from cyclopts.completion import CompletionContext
 
     from walkers.api import Run, Sweep
+    from walkers.runs.names import Reference
 
 
 def _completions(context: CompletionContext) -> list[str]:
-    """Names that a shell completes: case files, shipped cases, runs and sweeps in ``--out``."""
+    """Names that a shell completes: case files, shipped cases, runs and sweeps in ``--runs``."""
     from walkers.inputs.reading import shipped
 
     out = Path(context["out"].raw or DEFAULT_OUT)
@@ -50,7 +54,7 @@ AT_LEAST_1 = Number(gte=1)
 NOT_NEGATIVE = Number(gte=0)
 """Validator of a time limit, s."""
 _CASE = "A case file, the name of a shipped case such as fig1b, or a run (name or folder)."
-_RUN = "its folder, its name in --out, or its case (file or name)."
+_RUN = "its folder, its name in --runs, or its case (file or name)."
 
 CaseArgument = Annotated[str, Parameter(name="CASE", completer=_completions, help=_CASE)]
 RunArgument = Annotated[str, Parameter(name="RUN", completer=_completions, help=f"A run: {_RUN}")]
@@ -59,7 +63,14 @@ RunOrSweepArgument = Annotated[
 ]
 OutOption = Annotated[
     Path,
-    Parameter(validator=PathValidator(file_okay=False), help="Folder that contains the runs."),
+    Parameter(
+        ("--runs", "--out"),
+        validator=PathValidator(file_okay=False),
+        help="Folder that contains the runs; WALKERS_RUNS in the environment sets its default.",
+    ),
+]
+QuietOption = Annotated[
+    bool, Parameter(("--quiet", "-q"), help="Print only results and errors, no progress.")
 ]
 JobsOption = Annotated[
     int | None,
@@ -100,11 +111,23 @@ class LookupOptions:
 
         return settings_of(self.changes or ())
 
+    def find(self, name: str, *, quiet: bool = False) -> Reference:
+        """What a name means.
+
+        Keys that ``--set`` replaces by others are told on standard error, unless ``quiet``.
+        """
+        from walkers.runs.names import find
+
+        reference = find(name, self.out, self.values)
+        if not quiet:
+            tell_replaced(reference.replaced)
+        return reference
+
     def load(self, name: str) -> Run | Sweep:
         """The named run or sweep."""
         from walkers.api import load
 
-        return load(name, self.out, self.values)
+        return load(self.find(name))
 
     def run(self, name: str) -> Run:
         """The named run; `InputError` if the name is that of a sweep."""
@@ -152,7 +175,34 @@ def print_lines(lines: Iterable[object]) -> None:
         print(line)
 
 
+def tell_replaced(replaced: Mapping[str, Sequence[str]]) -> None:
+    """Tell which keys of a case the keys of ``--set`` replace, a line for each of these.
+
+    Keys that replace the same, such as those of a table in the place of a number, share a line.
+
+    Parameters
+    ----------
+    replaced
+        The replaced keys by the keys that replace them.
+    """
+    replacing: dict[tuple[str, ...], list[str]] = {}
+    for key, former in replaced.items():
+        replacing.setdefault(tuple(former), []).append(key)
+    for former_keys, keys in replacing.items():
+        verb = "replaces" if len(keys) == 1 else "replace"
+        tell(f"{', '.join(keys)} {verb} {', '.join(former_keys)} of the case")
+
+
+@contextmanager
+def warnings_shown(shown: bool) -> Iterator[None]:
+    """Show the warnings of a ``with`` block, or leave them out."""
+    with warnings.catch_warnings():
+        if not shown:
+            warnings.simplefilter("ignore")
+        yield
+
+
 def tell(*messages: str) -> None:
     """Print messages on standard error, a line each."""
     for message in messages:
-        print(f"walkers: {message}", file=sys.stderr, flush=True)
+        print(message_text(f"walkers: {message}", sys.stderr), file=sys.stderr, flush=True)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 import walkers
+from walkers.api import case_to_run, finished_run_of
 from walkers.commands.options import (
     NOT_NEGATIVE,
     CaseArgument,
@@ -16,17 +18,23 @@ from walkers.commands.options import (
     JobsOption,
     JsonOption,
     LookupOptions,
+    QuietOption,
     print_as,
     print_lines,
     refuse,
     tell,
+    tell_replaced,
+    warnings_shown,
 )
 from walkers.errors import apply_all
 from walkers.progress import progress_of
-from walkers.rounding import duration_text
+from walkers.rounding import counted, duration_text
+from walkers.terminal import text_width
 
 if TYPE_CHECKING:
     from walkers.inputs.sweep import SweepDefinition
+    from walkers.inputs.tables.case import Case
+    from walkers.runs.names import Reference
     from walkers.sweeps.scheduler import SweepOptions
     from walkers.sweeps.spread import Spread
 
@@ -77,10 +85,9 @@ def show(
     if theory:
         _show_theory(case, lookup, as_json)
         return
-    from walkers.runs.names import find
     from walkers.runs.preview import preview_text, summarise
 
-    summary = summarise(find(case, lookup.out, lookup.values).case)
+    summary = summarise(lookup.find(case).case)
     print_as(as_json, lambda: summary, lambda: preview_text(summary))
 
 
@@ -88,7 +95,7 @@ def _show_theory(case: str, lookup: LookupOptions, as_json: bool) -> None:
     """Print the prediction of the theory, beside the result of the run if there is one."""
     from walkers.theory.prediction_text import prediction_text
 
-    prediction = walkers.predict(case, lookup.out, lookup.values)
+    prediction = walkers.predict(lookup.find(case))
     result_of_run = prediction["engine"]
     print_as(as_json, lambda: prediction, lambda: prediction_text(prediction, result_of_run))
 
@@ -107,15 +114,18 @@ def _number_of_draws(spread: bool, points: int | None) -> int:
 
 
 def run(
-    *cases: CaseArgument,
+    *cases: Annotated[CaseArgument, Parameter(required=True)],
     lookup: LookupOptions = LookupOptions(),
     force: bool = False,
+    dry_run: bool = False,
     as_json: JsonOption = False,
     limit: Annotated[float | None, Parameter(validator=NOT_NEGATIVE)] = None,
     spread: bool = False,
     points: int | None = None,
     accuracy: bool = False,
     engine: EngineOption = None,
+    quiet: QuietOption = False,
+    verbose: Annotated[bool, Parameter(("--verbose", "-v"))] = False,
 ) -> int:
     """Run cases and print the results. A finished run is only printed, an interrupted run
     continues.
@@ -124,6 +134,9 @@ def run(
     ----------
     force
         Run again if the run exists.
+    dry_run
+        Print what would be run, where, whether it is there already and the predicted cost; run
+        nothing.
     limit
         Time limit in s for each run; for piles, for each segment.
     spread
@@ -133,18 +146,21 @@ def run(
     accuracy
         Also run with smaller time steps and harder beads, and print the numerical error of the
         result.
+    verbose
+        Print all numbers of the result, and all values that have not been measured.
     """
-    from walkers.api import case_to_run, finished_run_of
-    from walkers.runner.failures import EngineFailure
-    from walkers.runs.names import find
-    from walkers.runs.preview import notes
     from walkers.sweeps.accuracy import modulus_factors
     from walkers.sweeps.spread import spread_sweep
 
-    refuse("CASE", not cases, "expected a case, such as fig1b")
     draws = _number_of_draws(spread, points)
+    refuse("--verbose", verbose and (quiet or as_json), "is for texts: not with --quiet or --json")
+    refuse("--json", as_json and dry_run, "is for results, not for --dry-run")
     # Report a mistake in the last file before the first run starts.
-    references = [find(case, lookup.out, lookup.values) for case in cases]
+    references = [lookup.find(case, quiet=quiet) for case in cases]
+    options = _RunOptions(force, limit, draws, accuracy, engine, as_json, quiet, verbose)
+    if dry_run:
+        apply_all(lambda reference: _print_plan_of_run(reference, options), references)
+        return 0
     finished_runs: list[walkers.Run | None] = [None] * len(references)
     if not force:
         finished_runs = apply_all(finished_run_of, references)
@@ -155,33 +171,64 @@ def run(
         for case in loaded:
             list(spread_sweep(case, draws, engine).cases())  # refuses an unusable range
     failed = False
-    for reference, case, finished_run in zip(references, loaded, finished_runs, strict=True):
-        if finished_run is None:
-            tell(*[f"{case.name}: {note}" for note in notes(case)])
-        try:
-            done = finished_run or walkers.run(
-                case, reference.folder, engine=engine, force=force, progress=True, time_limit=limit
-            )
-        except EngineFailure as failure:
-            tell(f"{case.name}: {failure}")
-            failed = True
-            continue
-        if accuracy:
-            done.accuracy(progress=True, engine=engine)
-        band: Spread | None = None
-        if spread:
-            band = done.spread(draws, progress=True, engine=engine)
-            failed |= bool(band.failures)
-        _print_run(done, band, as_json)
+    with warnings_shown(not quiet):
+        for reference, case, finished_run in zip(references, loaded, finished_runs, strict=True):
+            failed |= _run_one(reference, case, finished_run, options)
     return 1 if failed else 0
 
 
-def _print_run(run: walkers.Run, band: Spread | None, as_json: bool) -> None:
+@dataclass(frozen=True)
+class _RunOptions:
+    """Options of ``walkers run``, by the names of its arguments; ``draws`` is 0 without spread."""
+
+    force: bool
+    limit: float | None
+    draws: int
+    accuracy: bool
+    engine: str | None
+    as_json: bool
+    quiet: bool
+    verbose: bool
+
+
+def _run_one(
+    reference: Reference, case: Case, finished_run: walkers.Run | None, options: _RunOptions
+) -> bool:
+    """Run a case unless its run is finished, and print the result; return whether a run failed."""
+    from walkers.runner.failures import EngineFailure
+    from walkers.runs.preview import notes
+
+    is_told = not options.quiet
+    engine = options.engine
+    if finished_run is None and is_told:
+        tell(*[f"{case.name}: {note}" for note in notes(case)])
+    try:
+        done = finished_run or walkers.run(
+            case,
+            reference.folder,
+            engine=engine,
+            force=options.force,
+            progress=is_told,
+            time_limit=options.limit,
+        )
+    except EngineFailure as failure:
+        tell(f"{case.name}: {failure}")
+        return True
+    if options.accuracy:
+        done.accuracy(progress=is_told, engine=engine)
+    band: Spread | None = None
+    if options.draws:
+        band = done.spread(options.draws, progress=is_told, engine=engine)
+    _print_run(done, band, options)
+    return band is not None and bool(band.failures)
+
+
+def _print_run(run: walkers.Run, band: Spread | None, options: _RunOptions) -> None:
     """Print the result of a run and, if it has one, the band of its spread; as JSON on one line."""
     from walkers.sweeps.spread import spread_text
 
-    if not as_json:
-        print(run.describe())
+    if not options.as_json:
+        print(run.describe(verbose=options.verbose))
         if band is not None:
             print(spread_text(band))
         return
@@ -191,6 +238,30 @@ def _print_run(run: walkers.Run, band: Spread | None, as_json: bool) -> None:
     contents["run"] = str(run.directory)
     contents["cached"] = run.cached
     print(json.dumps(contents))
+
+
+def _print_plan_of_run(reference: Reference, options: _RunOptions) -> None:
+    """Print what a run, its spread and its accuracy would do, and predict the cost."""
+    from walkers.runs.plan import plan_run
+    from walkers.sweeps.accuracy import plan_accuracy
+    from walkers.sweeps.scheduler import SweepOptions
+    from walkers.sweeps.spread import plan_spread
+
+    plan = plan_run(reference, options.engine, force=options.force)
+    print(plan.as_text())
+    folder = plan.directory.parent
+    further = {}
+    if options.accuracy:
+        further["accuracy"] = plan_accuracy(
+            plan.case, plan.directory, SweepOptions(), options.engine
+        )
+    if options.draws:
+        further["spread"] = plan_spread(
+            plan.case, folder, SweepOptions(), points=options.draws, engine=options.engine
+        )
+    for name, sweep_plan in further.items():
+        runs = counted(len(sweep_plan.missing), "more run")
+        print(f"  {name:10} {runs}, predicted {sweep_plan.core_seconds:.0f} core-seconds")
 
 
 def sweep(
@@ -205,6 +276,8 @@ def sweep(
     spread: bool = False,
     points: int | None = None,
     engine: EngineOption = None,
+    quiet: QuietOption = False,
+    verbose: Annotated[bool, Parameter(("--verbose", "-v"))] = False,
 ) -> int:
     """Run the missing points of a sweep on all cores or on a cluster. Exit status 1 if a point
     fails.
@@ -225,6 +298,8 @@ def sweep(
         show the bands.
     points
         Number of runs of each point for --spread; default: 32.
+    verbose
+        Also print the table of the sweep.
     """
     from walkers.inputs.sweep import load_sweep
     from walkers.postprocess.measure.uncertainty import uncertain_value_lines, uncertain_values
@@ -233,36 +308,41 @@ def sweep(
 
     draws = _number_of_draws(spread, points)
     loaded = load_sweep(sweep, lookup.values)
+    if not quiet:
+        tell_replaced(loaded.replaced_by(lookup.values))
     refuse(
         "--jobs",
         jobs is not None and site is not None,
         "the site file sets how many decks run at once",
     )
-    if len(loaded.rows) > _MANY_POINTS:
+    refuse("--verbose", verbose and quiet, "not with --quiet")
+    if len(loaded.rows) > _MANY_POINTS and not quiet:
         duration = duration_text(len(loaded.rows) / _RESOLVED_PER_SECOND)
         tell(f"{loaded.name}: resolving {len(loaded.rows)} points, which takes about {duration}")
     if dry_run:
         options = SweepOptions(jobs, load_site(site) if site else None)
         _print_plan(loaded, lookup.out, options, engine, draws if spread else None)
         return 0
-    done = walkers.sweep(
-        sweep,
-        lookup.out,
-        jobs=jobs,
-        changes=lookup.values,
-        progress=True,
-        site=site,
-        time_limit=limit,
-        spread=draws,
-        engine=engine,
-    )
+    with warnings_shown(not quiet):
+        done = walkers.sweep(
+            sweep,
+            lookup.out,
+            jobs=jobs,
+            changes=lookup.values,
+            progress=not quiet,
+            site=site,
+            time_limit=limit,
+            spread=draws,
+            engine=engine,
+        )
     for failure in done.failures:
         tell(f"point {failure.point}, {failure.run}: {failure.message}")
-    print(f"{done.summary()}\n  table      walkers list {done.directory}")
+    print(done.describe() if verbose else done.summary())
+    print(f"  table      walkers list {done.directory}")
     # The table has the values of the keys that vary.
     origins = next(loaded.cases()).origins
     of_all_points = [origin for origin in origins if origin.key not in loaded.keys]
-    print_lines(uncertain_value_lines(uncertain_values(of_all_points)))
+    print_lines(uncertain_value_lines(uncertain_values(of_all_points), text_width()))
     return 1 if done.failures else 0
 
 
@@ -275,7 +355,7 @@ def _print_plan(
     its uncertain values drawn from their ranges. None: no spread is asked for.
     """
     from walkers.sweeps.scheduler import plan_sweep
-    from walkers.sweeps.spread import spread_sweep
+    from walkers.sweeps.spread import plan_spread
 
     with progress_of(sweep.name) as advance:
         plan = plan_sweep(sweep, out, options, engine, advance)
@@ -285,7 +365,7 @@ def _print_plan(
     seconds = 0.0
     missing = 0
     for case in sweep.cases():
-        plan_of_spread = plan_sweep(spread_sweep(case, draws, engine), out, options, engine)
+        plan_of_spread = plan_spread(case, out, options, points=draws, engine=engine)
         seconds += plan_of_spread.core_seconds
         missing += len(plan_of_spread.missing)
     print(f"  spread     {missing} more runs, predicted {seconds:.0f} core-seconds")

@@ -7,12 +7,12 @@ A built-in law has a name of `walkers.physics.laws.LAWS`. A user's law is named
 from __future__ import annotations
 
 import hashlib
-import warnings
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from walkers.physics.laws import LAWS, built_in
+from walkers.warning import warn_user
 
 if TYPE_CHECKING:  # numpy is not needed to find a law by name
     from walkers.physics.bridge import BridgeLaw
@@ -80,5 +80,5 @@ def _of_user(name: str, file: Path, sha256: str | None) -> BridgeLaw:
     del sha256
     if not file.is_relative_to(Path(__file__).parents[1]):
         message = f"executes {file}, the bridge law of the case"
-        warnings.warn(message, ExecutedLawWarning, stacklevel=3)
+        warn_user(message, ExecutedLawWarning)
     return load_law(name, file)

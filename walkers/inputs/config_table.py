@@ -318,6 +318,22 @@ class ConfigTable(BaseModel):
                     yield cls.missing(name, place, instead)
 
     @classmethod
+    def replaced_by(cls, name: str, _value: object) -> set[str]:
+        """The keys of this table that a new value of a key replaces.
+
+        Parameters
+        ----------
+        name
+            The key.
+        _value
+            The value as a file has it. Most tables do not depend on it.
+        """
+        replaced: set[str] = set()
+        for choice in cls.choices:
+            replaced |= choice.excluded_by(name)
+        return replaced
+
+    @classmethod
     def missing(cls, name: str, place: str, instead: str = "") -> Problem:
         """The problem of a missing key.
 
@@ -452,19 +468,76 @@ def _field_at(model: type[ConfigTable], parts: Iterable[str | int]) -> FieldInfo
     return dotted_keys(model).get(".".join(names))
 
 
-def alternatives(model: type[ConfigTable], name: str) -> set[str]:
-    """The dotted keys that a dotted key of a kind of file excludes."""
+def alternatives(model: type[ConfigTable], name: str, value: object = None) -> set[str]:
+    """The dotted keys that a dotted key of a kind of file excludes.
+
+    Parameters
+    ----------
+    model
+        The class of the whole file.
+    name
+        The dotted key.
+    value
+        The value of the key as a file has it: a shape excludes the sizes of other shapes. None: any
+        value.
+    """
     *path, last = parts_of(name)
     table: type[ConfigTable] | None = model
     if path:
         table = table_class_of(_field_at(model, path))
     if table is None:
         return set()
-    excluded = set()
-    for choice in table.choices:
-        for other_name in choice.excluded_by(str(last)):
-            excluded.add(joined([*path, other_name]))
-    return excluded
+    return {joined([*path, other_name]) for other_name in table.replaced_by(str(last), value)}
+
+
+def replaced_keys(
+    model: type[ConfigTable], document: Mapping[str, Any], changes: Mapping[str, Any]
+) -> dict[str, list[str]]:
+    """The keys of a document that changes replace by other keys.
+
+    Parameters
+    ----------
+    model, document, changes
+        As for `changed`.
+
+    Returns
+    -------
+    dict
+        For each change that replaces other keys of the document, these keys in alphabetical order.
+        A number replaces the keys of a table in its place, and each key of the table the number.
+    """
+    replaced: dict[str, list[str]] = {}
+    for name, value in changes.items():
+        excluded = alternatives(model, name, value) - changes.keys()
+        given = _replaced_form(model, document, name, changes)
+        for key in excluded:
+            if value_at(document, parts_of(key)) is not MISSING:
+                given.append(key)
+        if given:
+            replaced[name] = sorted(given)
+    return replaced
+
+
+def _replaced_form(
+    model: type[ConfigTable], document: Mapping[str, Any], name: str, changes: Mapping[str, Any]
+) -> list[str]:
+    """The keys of the other form of a value that may be a number or a table.
+
+    The parameters are those of `replaced_keys`, and the dotted key of one of the changes. Empty if
+    the document has the same form, or if `changed` refuses the change.
+    """
+    present = value_at(document, parts_of(name))
+    if isinstance(present, Mapping) and not isinstance(changes[name], Mapping):
+        if is_number_or_table(_field_at(model, parts_of(name))):
+            return [key_within(name, part) for part in present]
+        return []
+    place = joined(parts_of(name)[:-1])
+    number = value_at(document, parts_of(place))
+    if number is MISSING or isinstance(number, Mapping) or place in changes:
+        return []
+    if gives_whole_table(model, place, changes):
+        return [place]
+    return []
 
 
 def changed(
@@ -499,7 +572,7 @@ def changed(
     for name in parts_last:
         value = changes[name]
         _make_table_of_number(model, tables, name, changes)
-        excluded = alternatives(model, name) - changes.keys()
+        excluded = alternatives(model, name, value) - changes.keys()
         _set_value_at(tables, name, copy.deepcopy(value), excluded)
     return tables
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
@@ -94,6 +95,35 @@ def flatten(table: Mapping[str, Any]) -> dict[str, Any]:
             raise key_error(repeated.pop(), "is given twice; expected one value")
         flat |= below
     return flat
+
+
+def written(value: Value) -> str:
+    """A value as a command line has it, the inverse of what `settings_of` reads.
+
+    Examples
+    --------
+    >>> written("70 Hz"), written(["0.3 mm", "0.2 mm"]), written({"at_rest": 0.1, "rise": 0.2})
+    ('70 Hz', '[0.3 mm, 0.2 mm]', '{ at_rest = 0.1, rise = 0.2 }')
+    """
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Mapping):
+        entries = ", ".join(f"{key} = {_toml(inner)}" for key, inner in value.items())
+        return f"{{ {entries} }}"
+    if isinstance(value, (list, tuple)):
+        if any(isinstance(entry, (list, tuple, Mapping)) for entry in value):
+            return _toml(value)
+        return f"[{', '.join(map(written, value))}]"
+    return str(value)
+
+
+def _toml(value: Value) -> str:
+    """A value as TOML has it within a list or a table."""
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(_toml, value))}]"
+    return written(value)
 
 
 def settings_of(words: Iterable[str]) -> dict[str, Value]:

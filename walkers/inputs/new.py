@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from walkers.errors import check_utf8, expected_of, input_error
+from walkers.errors import check_is_path, check_utf8, expected_of, input_error
 from walkers.files import write_json
 from walkers.inputs.reading import shipped
 
@@ -35,6 +35,7 @@ def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[
     InputError
         If the file exists already or cannot be written, or if there is no such shipped case.
     """
+    check_is_path("path", path)
     path = Path(path)
     check_utf8(path)
     if path.name in ("", "..") or path.stem in (".", ".."):
@@ -43,7 +44,7 @@ def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[
         path = path.with_name(f"{path.name}.toml")
     cases = shipped("case")
     if case not in cases:
-        raise input_error(case, expected_of(case, cases))
+        raise input_error(case, expected_of(str(case), cases))
     text = cases[case].read_text("utf-8")
     if schema:
         text = f"#:schema {_SCHEMA}\n\n{text}"

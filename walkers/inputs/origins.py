@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
-from walkers.inputs.units import QuantityKind, quantity_text
+from walkers.inputs.units import QuantityKind, as_quantity, quantity_text
 
 SourceKind = Literal[
     "given", "library", "own library", "calibrated", "assumed", "default", "derived"
@@ -93,6 +93,18 @@ class Origin:
         if self.uncertain:
             return f"{self.origin}, uncertain"
         return self.origin
+
+
+def accelerations_in_g(texts: Mapping[str, str]) -> bool:
+    """Whether a case gives the acceleration of its drive in g, not in m/s².
+
+    ``texts`` are the values of the case as text, by their keys.
+    """
+    for key, text in texts.items():
+        quantity = as_quantity(text)
+        if key.endswith("acceleration") and quantity is not None and quantity[1] == "g":
+            return True
+    return False
 
 
 def text_of(value: Any, kind: QuantityKind | None = None) -> str:

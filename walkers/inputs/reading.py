@@ -11,11 +11,21 @@ from copy import deepcopy
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import InputError, check_utf8, input_error, key_error, shortened, suggestion
-from walkers.inputs.keys import MISSING, value_at
+from walkers.errors import (
+    InputError,
+    check_changes,
+    check_is_path,
+    check_utf8,
+    input_error,
+    key_error,
+    quoted,
+    shortened,
+    suggestion,
+)
+from walkers.inputs.keys import MISSING, parts_of, value_at
 from walkers.inputs.messages import attributed_to
 from walkers.inputs.resolving.library import FILE_NAME, read_library
-from walkers.inputs.toml import read_toml, with_files
+from walkers.inputs.toml import FILE_KEYS, read_toml, with_files
 
 if TYPE_CHECKING:
     from walkers.inputs.tables.case import Case
@@ -31,6 +41,15 @@ _COMMANDS = {
     "its file goes to walkers sweep",
 }
 """What each kind of input is, and the commands for it; directories are told by a file in them."""
+_CALLS = {
+    "case": 'a case: walkers.run("{}")',
+    "sweep": 'a sweep: walkers.sweep("{}")',
+    "calibration": 'a calibration: walkers.calibrate("{}")',
+    "library": "a library: cases beside it can name what is in it",
+    "case.json": 'a run\'s directory: walkers.load("{}")',
+    "sweep.json": 'a sweep\'s directory: walkers.load("{}"); its file goes to walkers.sweep',
+}
+"""The same with the calls of Python."""
 _NO_NAMES = (".", "..")
 """Stems of files that have no name before their ``.toml``."""
 
@@ -41,16 +60,21 @@ def shipped(kind: str) -> dict[str, Path]:
 
 
 def load_case(
-    case: str | Path | Mapping[str, Any], changes: Mapping[str, Any] | None = None
+    case: Case | str | Path | Mapping[str, Any], changes: Mapping[str, Any] | None = None
 ) -> Case:
     """Read and resolve a case.
 
     Parameters
     ----------
     case
-        A TOML file, the name of a shipped case such as ``fig1b``, or the tables of a case file.
+        A TOML file, the name of a shipped case such as ``fig1b``, the tables of a case file, or a
+        resolved case, which keeps its name.
     changes
-        Values that replace those of the file, by dotted keys, written as in a case file.
+        Values that replace those of the file, by dotted keys, written as in a case file. A key also
+        replaces those that say the same in other words, such as ``drive.gamma0`` a
+        ``drive.peak_acceleration`` and ``boundary.mesh`` a ``boundary.shape`` with its sizes. Files
+        that changes name are looked for in the working directory; those that they replace need not
+        exist.
 
     Returns
     -------
@@ -70,13 +94,16 @@ def load_case(
     >>> load_case("fig1b", {"dimers.radii[1]": "0.25 mm"}).walkers[0].radii
     (0.0003, 0.00025)
     """
+    check_changes(changes)
+    if not isinstance(case, (str, Path, Mapping)):
+        return _changed(case, changes or {})
     if isinstance(case, Mapping):
         document: Mapping[str, Any] = deepcopy(case)  # the caller may change its tables later
         source = "<case>"
         name = "case"
     else:
         path = find_input(case, "case")
-        document = read_case(path)
+        document = read_case(path, changes=changes)
         source = str(case)
         name = path.stem
     # Not above: a missing file is reported before the models of a case are built, which takes time.
@@ -85,7 +112,19 @@ def load_case(
     return build_case(document, source=source, name=name, changes=changes, check_ranges=True)
 
 
-def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
+def _changed(case: object, changes: Mapping[str, Any]) -> Case:
+    """A resolved case with other values; `InputError` for what is none."""
+    from walkers.inputs.case_building import changed_case
+    from walkers.inputs.tables.case import Case
+
+    if not isinstance(case, Case):
+        raise input_error("case", f"{quoted(case)}: expected a case, its file, name or tables")
+    return changed_case(case, changes)
+
+
+def read_case(
+    path: Path, folder: Path | None = None, changes: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
     """The tables of a case file, with the contents of the files beside it.
 
     These are the mesh and the record that it names, and the user's own library. A case that has a
@@ -98,6 +137,9 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
     folder
         Where the library is for a case that comes with the program; the working directory if None.
         For another case, it is beside the file.
+    changes
+        Values by dotted keys that will replace some of the case. They are not made here, but files
+        that the case will no longer name are not read.
 
     Returns
     -------
@@ -112,7 +154,8 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
     document = read_toml(path)
     with attributed_to(str(path), document):
         _check_added_tables(document)
-        document = with_files(document, path.parent)
+        keys = keys_of_files(document, changes) if changes else FILE_KEYS
+        document = with_files(document, path.parent, keys=keys)
     if "library" not in document and path.name != FILE_NAME:
         library_folder = path.parent
         if path.parent == _HERE / "cases":
@@ -121,6 +164,30 @@ def read_case(path: Path, folder: Path | None = None) -> dict[str, Any]:
         if library:
             document["library"] = library
     return document
+
+
+def keys_of_files(document: Mapping[str, Any], changes: Mapping[str, Any]) -> list[str]:
+    """The keys whose files a case still names after changes (a part of `FILE_KEYS`).
+
+    Parameters
+    ----------
+    document
+        The tables of the case.
+    changes
+        Values by dotted keys. If they cannot be made, no key is lost.
+    """
+    # Not above: the models of a case take time to build.
+    from walkers.inputs.config_table import changed
+    from walkers.inputs.tables.case import CaseFile
+
+    tables: Mapping[str, Any] = document
+    with suppress(InputError):  # told where the changes are made
+        tables = changed(CaseFile, document, changes)
+    remaining = []
+    for key in FILE_KEYS:
+        if key not in changes and value_at(tables, parts_of(key)) is not MISSING:
+            remaining.append(key)
+    return remaining
 
 
 def _check_added_tables(document: Mapping[str, Any]) -> None:
@@ -160,6 +227,7 @@ def find_input(name: str | Path, kind: str) -> Path:
     InputError
         If there is no such file, or it is of another kind. The message suggests names or commands.
     """
+    check_is_path(kind, name, f"a {kind}: its file, name or tables")
     check_utf8(name)
     text = str(name)
     path = Path(name)
@@ -171,7 +239,9 @@ def find_input(name: str | Path, kind: str) -> Path:
             path = Path(f"{name}.toml")
         actual_kind = _kind_of(path)
         if actual_kind not in (None, kind):
-            raise input_error(name, f"is {_COMMANDS[str(actual_kind)].format(name)}")
+            call = _CALLS[str(actual_kind)].format(name)
+            command = _COMMANDS[str(actual_kind)].format(name)
+            raise input_error(name, f"is {call}", f"is {command}")
         if path.exists():
             if path.stem in _NO_NAMES:
                 raise input_error(name, "expected a name before .toml")

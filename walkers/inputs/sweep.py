@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -26,10 +27,16 @@ from walkers.inputs.axes import (
     zipped,
 )
 from walkers.inputs.case_building import build_case
-from walkers.inputs.config_table import ConfigTable, alternatives, changed, gives_whole_table
+from walkers.inputs.config_table import (
+    ConfigTable,
+    alternatives,
+    changed,
+    gives_whole_table,
+    replaced_keys,
+)
 from walkers.inputs.keys import Value, flatten, is_below
 from walkers.inputs.messages import attributed_to, check_key, validated
-from walkers.inputs.reading import find_input, read_case, shipped
+from walkers.inputs.reading import find_input, keys_of_files, read_case, shipped
 from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.toml import read_toml, with_files
 from walkers.inputs.units import Speed, Whole
@@ -143,6 +150,10 @@ class SweepDefinition:
         """The varied keys."""
         return tuple(self.units)
 
+    def replaced_by(self, changes: Mapping[str, Value]) -> dict[str, list[str]]:
+        """The keys of the base case that changes of it replace (`replaced_keys`)."""
+        return replaced_keys(CaseFile, self.base, changes)
+
     def cases(self) -> Iterator[Case]:
         """The resolved case of each point, one after the other.
 
@@ -175,6 +186,8 @@ def load_sweep(
     ----------
     sweep
         A sweep file, the name of a shipped sweep such as ``fig2``, or the tables of a sweep file.
+        A sweep of tables is named ``sweep@`` and a digest of them, so that different tables are
+        different sweeps.
     changes
         Values by dotted keys, which are added to the ``[set]`` of the file. The name of the sweep
         contains them.
@@ -192,7 +205,7 @@ def load_sweep(
     if isinstance(sweep, Mapping):
         document = dict(sweep)
         source = "<sweep>"
-        name = "sweep"
+        name = _name_of_tables(sweep)
         folder = Path()
     else:
         path = find_input(sweep, "sweep")
@@ -216,6 +229,18 @@ def load_sweep(
     if problems:
         raise InputError(source, problems)
     return definition
+
+
+def _name_of_tables(tables: Mapping[str, Any]) -> str:
+    """The name of a sweep that has no file: the same tables have the same name, and no others.
+
+    It is ``sweep@`` and a digest. The order of keys counts, because it is that of the points.
+    """
+    try:
+        contents = json.dumps(tables, default=str, skipkeys=True)
+    except (ValueError, RecursionError) as error:
+        raise input_error("<sweep>", "has infinitely nested tables") from error
+    return f"sweep@{hashlib.sha256(contents.encode()).hexdigest()[:_DIGITS_OF_DIGEST]}"
 
 
 def _with_changes(settings: Mapping[str, Any], changes: Mapping[str, Value]) -> dict[str, Any]:
@@ -290,14 +315,16 @@ def expand(
             settings = flatten(sweep_file.set)
             keys, rows = combinations(axes)
             _check_keys(settings, keys)
+            first_point = {**settings, **dict(zip(keys, rows[0], strict=True))}
             if base is None:
                 case_name = path.stem
-                base_tables: Mapping[str, Any] = read_case(path, folder)
+                base_tables: Mapping[str, Any] = read_case(path, folder, first_point)
             else:
                 case_name, base_tables = base
             # Meshes and records that values of the sweep name belong to the tables of a case.
             values = [*settings.items(), *_values_of_axes(axes)]
-            base_tables = with_files(base_tables, folder, values)
+            keys_of_base = keys_of_files(base_tables, first_point)
+            base_tables = with_files(base_tables, folder, values, keys_of_base)
             changed_base = changed(CaseFile, base_tables, settings)
             # Refuse keys that lead nowhere in the base case before all points are made.
             changed(CaseFile, changed_base, dict(zip(keys, rows[0], strict=True)))
@@ -347,7 +374,7 @@ def _base_file(case: str, source: str, folder: Path) -> Path:
         if path.is_dir():
             raise input_error(path, "expected a case file, or the name of a shipped case")
     except InputError as error:
-        problem = Problem("case", f'"{case}"', error.problems[0].expected)
+        problem = replace(error.problems[0], key="case", value=f'"{case}"')
         raise InputError(source, [problem]) from error
     except OSError as error:
         problem = Problem("case", f'"{case}"', f"cannot be read: {error.strerror}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,8 @@ from walkers.inputs.keys import parts_of, value_at
 
 _MOST_BYTES = 16 << 20
 """Largest size of a TOML file."""
+FILE_KEYS = ("boundary.mesh", "drive.record")
+"""Keys of a case whose values are names of files."""
 
 
 def toml_bytes(tables: Mapping[str, Any]) -> bytes:
@@ -47,7 +49,10 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def with_files(
-    document: Mapping[str, Any], folder: Path = Path(), values: Iterable[tuple[str, object]] = ()
+    document: Mapping[str, Any],
+    folder: Path = Path(),
+    values: Iterable[tuple[str, object]] = (),
+    keys: Collection[str] = FILE_KEYS,
 ) -> dict[str, Any]:
     """Add the contents of the files that a case names to its tables.
 
@@ -59,6 +64,8 @@ def with_files(
         Where the files are.
     values
         Further keys and values that may name files, such as those of the axes of a sweep.
+    keys
+        The keys of the case itself whose files are read, of `FILE_KEYS`.
 
     Returns
     -------
@@ -71,7 +78,8 @@ def with_files(
         If a file cannot be read.
     """
     tables = dict(document)
-    values_to_search = list(values)
+    values_to_search = [(key, value_at(tables, parts_of(key))) for key in keys]
+    values_to_search += values
     meshes = _unread(tables, "boundary.mesh", "meshes", values_to_search)
     if meshes:
         from walkers.inputs.meshes.mesh_file import read_mesh
@@ -110,10 +118,9 @@ def _unread(
     table
         The table that has the contents of such files.
     values
-        Further keys and their values.
+        Keys and their values.
     """
-    candidates = [value_at(tables, parts_of(key))]
-    candidates += [value for value_key, value in values if value_key == key]
+    candidates = [value for value_key, value in values if value_key == key]
     read = _contents(tables, table)
     unread: list[str] = []
     for name in candidates:

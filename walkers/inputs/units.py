@@ -37,6 +37,8 @@ _PATTERN = r"^\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[^\d\s%,;]"
 """Start of a quantity, for editors."""
 _GRAM_SYMBOL = re.compile(r"(?<![A-Za-z_])g(?![A-Za-z_0-9])")
 """The unit g alone, as in "g" or "m*g", but not in "kg"."""
+_EXPONENT = re.compile(r"([A-Za-z])([23])\b")
+"""An exponent without its sign, as in "m/s2"."""
 _ANGLE_UNITS = frozenset({"degree", "radian", "milliradian", "arcminute", "arcsecond"})
 """Pint's names of the units of angles."""
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}
@@ -65,6 +67,7 @@ def _usual_units() -> dict[str, tuple[str, float]]:
     for unit in _PREFIXED:
         for prefix, factor in _PREFIXES.items():
             units[f"{prefix}{unit}"] = (unit, factor)
+            units[f"{prefix}{unit.replace('*', ' ')}"] = (unit, factor)
     return units
 
 
@@ -72,6 +75,15 @@ _USUAL: Mapping[str, tuple[str, float]] = _usual_units()
 """Usual units; a case with only these units does not import pint, which takes time."""
 _ZEROS: Mapping[str, float] = {"K": 0.0, "degC": 273.15, "°C": 273.15}
 """Zero points of temperature units, K."""
+
+
+_SYMBOLS: Mapping[re.Pattern[str], str] = {
+    re.compile(r"(?<=\d )u(?=(m|s|N|g|J)\b)"): "µ",
+    re.compile(r"(?<=[ /])([a-z]{1,2})\^2\b"): r"\1²",
+    re.compile(r"(?<=[ /])([a-z]{1,2})\^3\b"): r"\1³",
+    re.compile(r"(?<=Pa)\*(?=s\b)"): " ",
+}
+"""What stands for symbols in case files, and the symbols (`with_symbols`)."""
 
 
 @dataclass(frozen=True)
@@ -186,6 +198,59 @@ def _factor_of(symbol: str, kind: QuantityKind) -> float:
     return factor
 
 
+def unit_factor(unit: str, target: str) -> float:
+    """How many of a target unit one unit is, such as 1000 mm/s in a m/s.
+
+    Parameters
+    ----------
+    unit
+        A unit as a user writes it, such as ``um/s``, ``m/s2`` or ``°``; empty for pure numbers.
+    target
+        A unit of the same kind. If it is an acceleration, g is 9.8 m/s², not the gram.
+
+    Raises
+    ------
+    ValueError
+        If the unit does not exist or is of another kind, or both are temperatures with different
+        zeros.
+
+    Examples
+    --------
+    >>> unit_factor("cm/s", "mm/s"), unit_factor("m/s2", "m/s^2"), unit_factor("%", "")
+    (10.0, 1.0, 0.01)
+    """
+    unit = _EXPONENT.sub(r"\1^\2", unit.strip())
+    if unit == target:
+        return 1.0
+    if _ZEROS.get(unit) != _ZEROS.get(target):
+        raise ValueError(f"expected {target}")
+    usual = _USUAL.get(unit)
+    usual_target = _USUAL.get(target)
+    if usual and usual_target and usual[0] == usual_target[0]:
+        return to_fifteen_digits(usual[1] / usual_target[1])
+    return _ratio_by_pint(unit, target)
+
+
+def _ratio_by_pint(unit: str, target: str) -> float:
+    """The value of an unusual unit in another one; errors are those of `unit_factor`."""
+    units = _registry()
+    expected = f"expected {target or 'no unit'}, or a unit of the same kind"
+    symbols = [unit, target]
+    if _USUAL.get(target, ("", 1.0))[0] == ACCELERATION.unit:
+        symbols = [_GRAM_SYMBOL.sub("gee", symbol) for symbol in symbols]
+    try:
+        source, goal = [units.Quantity(1.0, units.parse_units(symbol)) for symbol in symbols]
+        factor = float(source.to(goal.units).magnitude)
+        roots = [str(quantity.to_root_units().units) for quantity in (source, goal)]
+    except Exception as error:
+        # As in `_factor_by_pint`.
+        raise ValueError(expected) from error
+    # Pint treats radians as pure numbers.
+    if ("radian" in roots[0]) != ("radian" in roots[1]):
+        raise ValueError(expected)
+    return to_fifteen_digits(factor)
+
+
 def _bound_text(bound: float, factor: float, zero: float) -> str:
     """A bound in SI units as text in another unit, rounded to four digits."""
     rounded = f"{(bound - zero) / factor:.4g}"
@@ -255,6 +320,19 @@ def quantity_text(value: float, kind: QuantityKind) -> str:
     zero = _ZEROS.get(unit, 0.0)
     _, factor = _USUAL.get(unit, ("", 1.0))
     return f"{(value - zero) / factor:.6g} {unit}"
+
+
+def with_symbols(text: str) -> str:
+    """Quantities as a physicist writes them, for people; `parse_quantity` reads both forms.
+
+    Examples
+    --------
+    >>> with_symbols("70 um, 0.92 g/cm^3, 4.6 mPa*s, 9.8 m/s^2")
+    '70 µm, 0.92 g/cm³, 4.6 mPa s, 9.8 m/s²'
+    """
+    for written, symbol in _SYMBOLS.items():
+        text = written.sub(symbol, text)
+    return text
 
 
 def kind_in(annotations: Iterable[Any]) -> QuantityKind | None:

@@ -8,7 +8,6 @@ expected ones. It is valid for one binary and one build of the contact model.
 from __future__ import annotations
 
 import shlex
-import warnings
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import lru_cache
@@ -19,6 +18,7 @@ from walkers.files import read_json, write_json
 from walkers.runner.binary import ENGINE_VARIABLE, Engine
 from walkers.runner.compiled_model import model_sha256
 from walkers.runner.failures import AuditFailed, UnauditedEngineWarning
+from walkers.warning import warn_user
 
 _OUTCOME = ("passed", "lines", "failures", "date")
 """Entries of the outcome of an audit: whether it passed, its lines, those that failed, the date."""
@@ -53,8 +53,8 @@ def check_audit(engine: Engine) -> None:
         raise AuditFailed(
             f"{engine.path} failed its audit in {len(failures)} line(s), first: {failures[0]}; "
             f"to see them and to audit it again: {_audit_command(engine)}; to run, install "
-            "Debian's package liggghts again, or name another binary by --engine or "
-            f"{ENGINE_VARIABLE}"
+            "Debian's package liggghts again, or name another binary by --engine (in "
+            f"Python engine=) or {ENGINE_VARIABLE}"
         )
 
 
@@ -66,10 +66,11 @@ def _audit_command(engine: Engine) -> str:
 @lru_cache(maxsize=8)
 def _warn_unaudited(engine: Engine) -> None:
     """Warn of an engine without an audit; because of the cache, only once in a process."""
-    warnings.warn(
-        f"{engine.path} was never audited with its contact model: {_audit_command(engine)}",
+    warn_user(
+        f"{engine.path} was never audited with its contact model: {_audit_command(engine)} "
+        "compares the forces of this binary with the expected ones, once for a machine. Until "
+        "then, runs are computed all the same, but nothing shows that their forces are right",
         UnauditedEngineWarning,
-        stacklevel=4,
     )
 
 

@@ -10,10 +10,11 @@ import shutil
 import signal
 import subprocess
 import threading
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
+
+from walkers.warning import warn_user
 
 ALONE = {
     "OMPI_MCA_ess_singleton_isolated": "1",  # no orted
@@ -118,9 +119,7 @@ def off_the_network() -> tuple[str, ...]:
                 [*prefix, "true"], stdin=subprocess.DEVNULL, capture_output=True, check=True
             )
             return prefix
-    warnings.warn(
-        "mpirun listens on all networks: unshare (util-linux) cannot take them away", stacklevel=2
-    )
+    warn_user("mpirun listens on all networks: unshare (util-linux) cannot take them away")
     return ()
 
 

@@ -66,6 +66,8 @@ LAW_NAME = "law.py"
 """Copy of the file of a user's law."""
 FAILURE_NAME = "failure.json"
 """The failure of the last attempt, in the directory of an unfinished run."""
+REQUESTED_NAME = "requested"
+"""Note of a run that was asked for by itself (`mark_as_requested`)."""
 SEGMENTS = "segments"
 """Folder of the segments."""
 FIRST_SEGMENT = Path(SEGMENTS) / "0000"
@@ -299,6 +301,22 @@ def leave_out_dumps(directory: Path) -> None:
 def is_deck_folder(folder: Path) -> bool:
     """Whether a folder contains a deck to be run by hand."""
     return (folder / DECK_RECORD_NAME).is_file() and (folder / DECK_NAME).is_file()
+
+
+def mark_as_requested(directory: Path) -> None:
+    """Note in a finished run that it was asked for by itself, not only as a point of a sweep.
+
+    Nothing is written if the folder cannot be written, as in an archive: listings alone read it.
+    """
+    note = directory / REQUESTED_NAME
+    if not note.exists():
+        with suppress(OSError):
+            write_bytes(note, b"walkers list shows this run: it was asked for by itself\n")
+
+
+def is_requested(directory: Path) -> bool:
+    """Whether a run was asked for by itself."""
+    return (directory / REQUESTED_NAME).is_file()
 
 
 def is_finished(directory: Path) -> bool:
@@ -589,7 +607,7 @@ def _lock(file: Path, deadline: float) -> int | None:
             file.unlink(missing_ok=True)
             message = (
                 f"files cannot be locked ({error.strerror}): expected a folder on a file system "
-                "with locks (flock); choose another one with --out, or out= in Python"
+                "with locks (flock); choose another one with --runs, or out= in Python"
             )
             raise input_error(file.parent, message) from error
         os.close(descriptor)

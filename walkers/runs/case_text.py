@@ -8,21 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from functools import cache
-from math import isclose
 from typing import Any
 
 from pydantic_core import to_jsonable_python
 
-from walkers.errors import input_error
-from walkers.inputs import units
 from walkers.inputs.config_table import dotted_keys
 from walkers.inputs.origins import text_of
 from walkers.inputs.tables.case import Case, CaseFile
-from walkers.inputs.units import QuantityKind
+from walkers.inputs.units import QuantityKind, kind_in
 
 _NANOMETRES_PER_METRE = 1e9
-_SAME_VALUE = 1e-6
-"""Relative difference up to which a value in a condition equals that of a case."""
 _COMPARED_DIGITS = 12
 """Significant digits in which values of different cases are compared."""
 _NOT_GIVEN = {"default", "derived"}
@@ -85,62 +80,9 @@ def value_text(case: Mapping[str, Any], key: str) -> str:
     return f"{at_rest} + {text_of(rise)} v/(v + {velocity})"
 
 
-def has_value(case: Mapping[str, Any], condition: str) -> bool | None:
-    """Whether a case has a value.
-
-    Parameters
-    ----------
-    case
-        A flattened case.
-    condition
-        ``KEY=VALUE`` with a value as in a case file, such as ``frequency=80 Hz``. The key may be
-        the end of a dotted key; the condition holds if it holds for one of the keys with this end.
-
-    Returns
-    -------
-    bool or None
-        None if the case has no such key.
-
-    Raises
-    ------
-    InputError
-        If the condition cannot be read.
-    """
-    before, _, after = condition.partition("=")
-    key = before.strip()
-    text = after.strip()
-    if not key or not text:
-        expected = 'expected KEY=VALUE, such as "drive.frequency=80 Hz"'
-        raise input_error("where", f'"{condition}": {expected}')
-    answer = None
-    for name, value in case.items():
-        if f".{name}".endswith(f".{key}"):
-            if _equals(name, value, text.strip('"')):
-                return True
-            answer = False
-    return answer
-
-
-def _equals(key: str, value: Any, text: str) -> bool:
-    """Whether the value of a key equals a value that is given as text, in any unit of its kind."""
-    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not is_number or text == str(value):
-        return text.lower() in (readable(key, value).lower(), str(value).lower())
-    try:
-        number = _parsed(text, quantity_kind(key))
-    except ValueError as error:
-        raise input_error("where", f'"{key}={text}": {error}') from error
-    return isclose(number, value, rel_tol=_SAME_VALUE)
-
-
-def _parsed(text: str, kind: QuantityKind | None) -> float:
-    """A text as a number in SI units; `ValueError` says what was expected."""
-    if kind is not None:
-        return units.parse_quantity(text, kind)
-    try:
-        return float(text)
-    except ValueError as error:
-        raise ValueError("expected a number without a unit") from error
+def without_parts(keys: Sequence[str]) -> list[str]:
+    """Keys without those whose values `value_text` writes in the value of another one of them."""
+    return [key for key in keys if key.rpartition(".")[0] not in keys]
 
 
 @cache
@@ -148,7 +90,7 @@ def quantity_kind(key: str) -> QuantityKind | None:
     """The kind of quantity of a key, such as ``dimers.radii[0]``; None for pure numbers."""
     for name, field in dotted_keys(CaseFile).items():
         if _last_two_parts(name) == _last_two_parts(key):
-            kind = units.kind_in([*field.metadata, field.annotation])
+            kind = kind_in([*field.metadata, field.annotation])
             if kind is not None:
                 return kind
     return None

@@ -11,10 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from html import escape
 from math import hypot, isfinite, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from walkers.inputs.keys import is_below
+from walkers.inputs.units import with_symbols
 from walkers.physics.laws import LAWS
 from walkers.postprocess.measure.numbers import (
     NOT_SHOWN_ALONE,
@@ -34,9 +37,12 @@ from walkers.postprocess.measure.quantities import (
 from walkers.postprocess.measure.results import Results, json_numbers, not_computed, read_results
 from walkers.rounding import counted, rounded
 from walkers.runner.manifest import read_manifest
-from walkers.runs.case_text import differing, flattened, readable
+from walkers.runs.case_text import differing, flattened, value_text, without_parts
+from walkers.runs.draws import ComparedDraws, Draws, compare_draws
+from walkers.runs.draws_text import compared_draws_text
 from walkers.templates.deck import bridge_tables_digest
-from walkers.text import aligned, with_unit
+from walkers.terminal import fitted_lines, table_width
+from walkers.text import aligned_blocks, with_unit
 
 if TYPE_CHECKING:
     from walkers.inputs.tables.case import Case
@@ -66,16 +72,19 @@ class ComparedRun:
         Its case.
     directory
         The directory of its finished run; None if there is none.
+    draws
+        The draws of the spread of the run; None if it has no spread.
     """
 
     name: str
     case: Case
     directory: Path | None
+    draws: Draws | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
-    """Differences of two runs or cases.
+    """Differences of two runs or cases; printed, it is the table.
 
     Attributes
     ----------
@@ -88,22 +97,34 @@ class Comparison:
     contents: Mapping[str, Any]
     text: str
 
+    def __repr__(self) -> str:
+        return self.text
+
+    def _repr_html_(self) -> str:
+        """The table in a notebook."""
+        return f"<pre>{escape(self.text)}</pre>"
+
 
 @dataclass(frozen=True)
 class _Parameter:
-    """A key whose values differ between the cases, with the values (SI) and where each is from."""
+    """A key whose values differ between the cases, with the values and where each is from.
+
+    The values are in SI units; the texts are those of the table.
+    """
 
     key: str
     values: Sequence[Any]
+    texts: Sequence[str]
     origin_words: Sequence[str | None]
 
 
 @dataclass(frozen=True)
 class _FinishedRun:
-    """The name of a side, and the results of its run."""
+    """The name of a side, the results of its run, and the draws of its spread if it has one."""
 
     name: str
     results: Results
+    draws: Draws | None
 
 
 @dataclass(frozen=True)
@@ -138,13 +159,15 @@ def compare_runs(first: ComparedRun, second: ComparedRun) -> Comparison:
     parameters_text = _parameters_text(parameters, [first.name, second.name])
     results_text: list[str] = []
     numbers: list[_ComparedNumber] = []
+    draws: ComparedDraws | None = None
     if first.directory and second.directory:
         runs = (
-            _FinishedRun(first.name, read_results(first.directory)),
-            _FinishedRun(second.name, read_results(second.directory)),
+            _FinishedRun(first.name, read_results(first.directory), first.draws),
+            _FinishedRun(second.name, read_results(second.directory), second.draws),
         )
         numbers = _compared_numbers(runs[0].results, runs[1].results)
-        results_text = _results_text(numbers, runs)
+        draws = _compared_draws(numbers, runs)
+        results_text = _results_text(numbers, runs, draws)
         if not parameters:
             parameters_text += _cycles_text(numbers, runs)
     paragraphs = [parameters_text, *results_text]
@@ -155,13 +178,19 @@ def compare_runs(first: ComparedRun, second: ComparedRun) -> Comparison:
         if side.directory is None:
             paragraphs.append(f"{side.name}: no finished run; only the parameters are compared")
             not_run.append(side.name)
+    values = {}
+    sources = {}
+    for parameter in parameters:
+        values[parameter.key] = parameter.values
+        sources[parameter.key] = parameter.origin_words
     contents = {
         "first": first.name,
         "second": second.name,
-        "parameters": {parameter.key: parameter.values for parameter in parameters},
-        "sources": {parameter.key: parameter.origin_words for parameter in parameters},
+        "parameters": values,
+        "sources": sources,
         "not_run": not_run,
         "results": [json_numbers(asdict(number)) for number in numbers],
+        "draws": asdict(draws) if draws else None,
     }
     return Comparison(contents, "\n\n".join(paragraphs))
 
@@ -176,6 +205,7 @@ def _differing_parameters(first: Case, second: Case) -> list[_Parameter]:
         parameter = _Parameter(
             key,
             values=[first_values.get(key), second_values.get(key)],
+            texts=[value_text(first_values, key), value_text(second_values, key)],
             origin_words=[
                 first_values.origin_words.get(key),
                 second_values.origin_words.get(key),
@@ -186,18 +216,31 @@ def _differing_parameters(first: Case, second: Case) -> list[_Parameter]:
 
 
 def _parameters_text(parameters: Sequence[_Parameter], names: Sequence[str]) -> str:
-    """A table of the parameters with the names of both sides as headings."""
+    """A table of the parameters with the names of both sides as headings.
+
+    A friction that grows with the velocity in one case alone has one row, with the sources of its
+    numbers.
+    """
     if not parameters:
         return "the cases are the same"
     rows = [["parameter", *names, "source"]]
-    for parameter in parameters:
-        values = [readable(parameter.key, value) for value in parameter.values]
-        sources: list[str] = []
-        for word in parameter.origin_words:
-            if word and word not in sources:
-                sources.append(word)
-        rows.append([parameter.key, *values, " / ".join(sources)])
-    return aligned(rows)
+    by_key = {parameter.key: parameter for parameter in parameters}
+    for key in without_parts(list(by_key)):
+        texts = map(with_symbols, by_key[key].texts)
+        rows.append([key, *texts, _sources_text(key, parameters)])
+    return aligned_blocks(rows, table_width())
+
+
+def _sources_text(key: str, parameters: Sequence[_Parameter]) -> str:
+    """Where the values of a key and of its parts are from, those of the first case first."""
+    words: list[str] = []
+    for side in range(2):
+        for parameter in parameters:
+            word = parameter.origin_words[side]
+            is_of_key = parameter.key == key or is_below(parameter.key, key)
+            if is_of_key and word and word not in words:
+                words.append(word)
+    return " / ".join(words)
 
 
 def _has_other_bridge_tables(side: ComparedRun) -> bool:
@@ -270,6 +313,25 @@ def _compared_number(name: str, unit: str, first: Results, second: Results) -> _
     )
 
 
+def _compared_draws(
+    numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]
+) -> ComparedDraws | None:
+    """The main number of both runs over the draws of their spreads.
+
+    None if the runs have different main numbers or the same value, or one has no band of it.
+    """
+    first, second = runs
+    main = headline(first.results)
+    if main != headline(second.results) or first.draws is None or second.draws is None:
+        return None
+    for number in numbers:
+        if number.quantity == main and number.differs:
+            quantity = declared(main)
+            if all(band_of(run.results, quantity) for run in runs):
+                return compare_draws(first.draws, second.draws, main, quantity.si_unit)
+    return None
+
+
 def _number(value: Any) -> float:
     """A value of a result as a number; NaN if there is none, or if it is text."""
     if value is None or isinstance(value, str):
@@ -280,8 +342,15 @@ def _number(value: Any) -> float:
 # --- text of results ------------------------------------------------------------------------------
 
 
-def _results_text(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]) -> list[str]:
-    """Paragraphs: numbers that differ, their errors, warnings of the runs, numbers that do not."""
+def _results_text(
+    numbers: Sequence[_ComparedNumber],
+    runs: Sequence[_FinishedRun],
+    draws: ComparedDraws | None,
+) -> list[str]:
+    """Paragraphs: numbers that differ, their errors, draws, warnings, numbers that do not differ.
+
+    The draws are those of the main number over both spreads; None if there are none.
+    """
     differing_numbers = []
     same = []
     for number in numbers:
@@ -292,16 +361,18 @@ def _results_text(numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRu
     paragraphs = []
     if differing_numbers:
         paragraphs += _table_of_numbers(differing_numbers, runs)
-    errors = _error_lines(differing_numbers, runs)
+    errors = _error_lines(differing_numbers, runs, draws)
     if errors:
-        paragraphs.append("\n".join(errors))
+        paragraphs.append(fitted_lines(errors))
+    if draws is not None:
+        paragraphs.append(compared_draws_text(draws, runs[0].name, runs[1].name))
     warnings = []
     for run in runs:
         warnings += [f"{run.name}: warning: {warning}" for warning in run.results.warnings]
     if warnings:
-        paragraphs.append("\n".join(warnings))
+        paragraphs.append(fitted_lines(warnings))
     if same and differing_numbers:
-        paragraphs.append(f"the same in both: {', '.join(same)}")
+        paragraphs.append(fitted_lines([f"the same in both: {', '.join(same)}"]))
     elif same:
         paragraphs.append("all results are the same")
     return paragraphs
@@ -329,12 +400,13 @@ def _table_of_numbers(
         if set(cells) != {_DASH}:
             columns.append((head, *cells))
             has_scatter |= head == "scatter of copies"
-    paragraphs = [aligned(list(zip(*columns, strict=True)))]
+    paragraphs = [aligned_blocks(list(zip(*columns, strict=True)), table_width())]
     if has_scatter:
-        paragraphs.append(
+        meaning = (
             "scatter of copies: how much copies differ by their start; "
             "it is not an error of the difference"
         )
+        paragraphs.append(fitted_lines([meaning]))
     return paragraphs
 
 
@@ -394,7 +466,9 @@ def _signed_difference(number: _ComparedNumber) -> str:
 
 
 def _error_lines(
-    differing_numbers: Sequence[_ComparedNumber], runs: Sequence[_FinishedRun]
+    differing_numbers: Sequence[_ComparedNumber],
+    runs: Sequence[_FinishedRun],
+    draws: ComparedDraws | None,
 ) -> list[str]:
     """Lines on how certain the differences are; none if no velocity or main number differs.
 
@@ -409,7 +483,7 @@ def _error_lines(
             times = error_text(abs(number.difference) / number.numerical_error, "")
             lines.append(f"{number.quantity}: differs by {times} times its numerical error")
     if any(headline(run.results) in number_by_name for run in runs):
-        lines += _band_lines(runs)
+        lines += _band_lines(runs, draws)
     # The field of `not_computed` tells whether the numerical error is missing.
     unmeasured = [run for run in runs if not_computed(run.results).numerical_error]
     if velocities and unmeasured:
@@ -418,8 +492,11 @@ def _error_lines(
     return lines
 
 
-def _band_lines(runs: Sequence[_FinishedRun]) -> list[str]:
-    """The band of each run, and the number of uncertain values that both runs have in common."""
+def _band_lines(runs: Sequence[_FinishedRun], draws: ComparedDraws | None) -> list[str]:
+    """The band of each run, and the number of uncertain values that both runs have in common.
+
+    Compared draws, which have a paragraph of their own, say more than this number.
+    """
     lines = []
     for run in runs:
         band = _band_text(run.results)
@@ -427,7 +504,7 @@ def _band_lines(runs: Sequence[_FinishedRun]) -> list[str]:
             lines.append(f"{run.name}: {band}")
     first, second = runs
     shared = _uncertain_keys(first.results) & _uncertain_keys(second.results)
-    if shared:
+    if shared and draws is None:
         values = f"the runs have {counted(len(shared), 'uncertain value')} in common"
         lines.append(
             f"{values}, which may shift both results alike: "

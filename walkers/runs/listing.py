@@ -9,15 +9,17 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from stat import S_ISDIR
 from typing import Any
 
+from walkers import RECORDS
 from walkers.errors import InputError, input_error, suggestion
 from walkers.files import read_json
 from walkers.inputs.case_building import stored_case
 from walkers.inputs.tables.case import Case
+from walkers.inputs.units import with_symbols
 from walkers.postprocess.measure.numbers import headline, short_text
 from walkers.postprocess.measure.results import Results, json_numbers, read_results
 from walkers.rounding import duration_text
@@ -27,13 +29,14 @@ from walkers.runs.case_text import (
     FlatCase,
     differing,
     flattened,
-    has_value,
     short_keys,
     value_text,
+    without_parts,
 )
+from walkers.runs.conditions import Condition
 from walkers.runs.making import progress_at
 from walkers.runs.status import state_at
-from walkers.text import aligned
+from walkers.text import fitted_table
 
 _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 """Bytes in the units of sizes, the largest first."""
@@ -48,7 +51,8 @@ class ListEntry:
     kind
         ``run`` or ``sweep``.
     name
-        Name of the directory without the ending of unfinished runs, such as ``fig1b-9845e7cce370``.
+        Name of the directory without the ending of unfinished runs, such as ``fig1b-9845e7cce370``;
+        of a run in the directory of a sweep, after the name of the sweep and a slash.
     case
         Name of the case; of a sweep, of its base case.
     status
@@ -73,6 +77,10 @@ class ListEntry:
         Names of the runs of a sweep.
     parameters
         Values of the case (`flattened`); of a sweep, the number of values of each varied key.
+    title
+        What a sweep is about; empty for a run.
+    requested
+        Whether a run was asked for by itself, not only as a point of a sweep.
     """
 
     kind: str
@@ -90,6 +98,8 @@ class ListEntry:
     points: Mapping[str, int] | None = None
     runs: Sequence[str] | None = None
     parameters: FlatCase = field(default_factory=FlatCase)
+    title: str = ""
+    requested: bool = False
 
     @property
     def age_and_size(self) -> list[str]:
@@ -98,7 +108,7 @@ class ListEntry:
 
 
 def runs_in(out: Path) -> list[ListEntry]:
-    """The runs in a folder, finished or not, sorted by name.
+    """The runs in a folder and in the sweeps in it, finished or not, sorted by name.
 
     Of two runs with the same name, the finished one comes first. Runs in progress without a
     directory, such as those in a shared deck, are among them.
@@ -108,13 +118,22 @@ def runs_in(out: Path) -> list[ListEntry]:
     InputError
         If the path is a file. A folder that does not exist has no runs.
     """
-    runs = []
+    runs = _runs_in_one_folder(out)
     for path in folders_in(out):
+        if (path / RECORDS["sweep"]).is_file():  # of a spread, whose draws are in it
+            for run in _runs_in_one_folder(path):
+                runs.append(replace(run, name=f"{path.name}/{run.name}"))
+    return sorted(runs, key=lambda run: (run.name, run.status != "finished"))
+
+
+def _runs_in_one_folder(folder: Path) -> list[ListEntry]:
+    """The runs in a folder, without those in sweeps."""
+    runs = []
+    for path in folders_in(folder):
         run = entry_of(path)
         if run is not None:
             runs.append(run)
-    runs += _without_directory(out, {place_of(run.directory) for run in runs})
-    return sorted(runs, key=lambda run: (run.name, run.status != "finished"))
+    return runs + _without_directory(folder, {place_of(run.directory) for run in runs})
 
 
 def folders_in(out: Path) -> list[Path]:
@@ -232,6 +251,7 @@ def _finished(path: Path, case: str, parameters: FlatCase) -> ListEntry:
         result=text,
         numbers=numbers,
         parameters=parameters,
+        requested=run_directory.is_requested(path),
     )
 
 
@@ -310,30 +330,35 @@ def bytes_text(size: int) -> str:
 
 
 def select(runs: Sequence[ListEntry], where: Iterable[str]) -> list[ListEntry]:
-    """The runs that have all values (`has_value`).
+    """The runs that meet all conditions (`walkers.runs.conditions.Condition`).
 
     Raises
     ------
     InputError
-        If a condition cannot be read, or no run has its key.
+        If a condition cannot be read, or no run has its key or number.
     """
     selected = list(runs)
-    for condition in where:
-        answers = [has_value(run.parameters, condition) for run in selected]
+    for text in where:
+        condition = Condition.read(text)
+        answers = [condition.holds(run.parameters, run.numbers) for run in selected]
         if selected and all(answer is None for answer in answers):
             raise _no_such_key(condition, selected)
         selected = [run for run, answer in zip(selected, answers, strict=True) if answer]
     return selected
 
 
-def _no_such_key(condition: str, runs: Sequence[ListEntry]) -> InputError:
-    """The error for a condition whose key no run has, with the keys that runs have."""
+def _no_such_key(condition: Condition, runs: Sequence[ListEntry]) -> InputError:
+    """The error for a condition whose key no run has, with the keys and numbers that runs have."""
     keys: set[str] = set()
+    numbers: set[str] = set()
     for run in runs:
         keys.update(run.parameters)
+        numbers.update(run.numbers or ())
     names = short_keys(sorted(keys))
-    near = suggestion(condition.partition("=")[0].strip(), names)
-    text = f'"{condition}": no run has such a key{near}; runs have {", ".join(names)}'
+    near = suggestion(condition.key, [*names, *sorted(numbers)])
+    text = f'"{condition.text}": no run has such a key{near}; runs have {", ".join(names)}'
+    if numbers:
+        text += ", and the numbers of their results, such as velocity"
     return input_error("where", text)
 
 
@@ -356,17 +381,20 @@ class RunsOfCase:
     runs: Sequence[ListEntry]
     keys: Sequence[str]
 
-    def as_text(self) -> str:
-        """A line for each run, with a column for each key by which the runs differ."""
+    def as_text(self, width: int | None = None) -> str:
+        """A line for each run, with a column for each key by which the runs differ.
+
+        If the columns are wider than ``width``, the values stand below each run.
+        """
         heads = [f"{self.case} ({len(self.runs)})", "status", "result", "age", "size"]
         lines = [[*heads, *short_keys(self.keys)]]
         for run in self.runs:
             status = run.status
             if run.reason:
                 status = f"{run.status}: {run.reason}"
-            values = [value_text(run.parameters, key) for key in self.keys]
+            values = [with_symbols(value_text(run.parameters, key)) for key in self.keys]
             lines.append([run.name, status, run.result, *run.age_and_size, *values])
-        return aligned(lines)
+        return fitted_table(lines, len(heads), width, styled_column=1)
 
 
 def by_case(runs: Sequence[ListEntry]) -> list[RunsOfCase]:
@@ -377,5 +405,5 @@ def by_case(runs: Sequence[ListEntry]) -> list[RunsOfCase]:
     groups = []
     for case, members in runs_of.items():
         given, derived = differing([run.parameters for run in members if run.parameters])
-        groups.append(RunsOfCase(case, members, given or derived))
+        groups.append(RunsOfCase(case, members, without_parts(given or derived)))
     return groups

@@ -6,18 +6,21 @@ is handed on.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
+from glob import escape
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from walkers import DEFAULT_OUT, RECORDS
-from walkers.errors import InputError, WalkersError, input_error
+from walkers.errors import InputError, WalkersError, check_changes, check_is_path, input_error
 from walkers.inputs.case_building import changed_case
+from walkers.inputs.config_table import replaced_keys
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
-from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.case import Case, CaseFile
+from walkers.inputs.toml import read_toml
 from walkers.runner import run_directory
 from walkers.runner.binary import find_engine
 from walkers.runner.failures import EngineMissing
@@ -34,17 +37,25 @@ Changes: TypeAlias = "Mapping[str, Any] | None"
 
 _NOT_A_RUN: Mapping[NotARun, str] = {
     "folder": "not a finished run: expected a folder with a manifest.json",
-    "deck": "is a deck that was run by hand; first do: walkers run {name}",
+    "deck": 'is a deck that was run by hand; first do: walkers.run("{name}")',
     "calibration": "a calibration's outcome: its report is calibration.md",
-    "sweep": "is a sweep: expected one of its runs; walkers list, plot and report take sweeps",
+    "sweep": 'is a sweep: expected one of its runs; walkers.load("{name}") loads it',
     "archive": "an archive: unpack it and give a run or a sweep in it",
 }
 """Why a name of a kind is refused where a run is expected."""
+_NOT_A_RUN_IN_COMMAND: Mapping[NotARun, str] = {
+    "deck": "is a deck that was run by hand; first do: walkers run {name}",
+    "sweep": "is a sweep: expected one of its runs; walkers list, plot and report take sweeps",
+}
+"""The same on the command line, where it differs."""
 
 
 def not_a_run(name: object, kind: NotARun) -> InputError:
     """An error that says what a name means, where a run was expected."""
-    return input_error(name, _NOT_A_RUN[kind].format(name=name))
+    in_command = _NOT_A_RUN_IN_COMMAND.get(kind)
+    if in_command is not None:
+        in_command = in_command.format(name=name)
+    return input_error(name, _NOT_A_RUN[kind].format(name=name), in_command)
 
 
 @dataclass(frozen=True)
@@ -111,6 +122,27 @@ class Reference:
         return load_case(given, self.changes)
 
     @cached_property
+    def replaced(self) -> Mapping[str, Sequence[str]]:
+        """The keys of the case that its changes replace by other keys (`replaced_keys`).
+
+        Empty if there are no changes, or if there is no case that can be read.
+        """
+        document: Mapping[str, Any] = {}
+        given = self.given
+        with suppress(InputError):  # told when the case is used
+            if not self.changes:
+                pass
+            elif isinstance(given, Case):
+                document = given.document
+            elif isinstance(given, Mapping):
+                document = given
+            elif self.kind == "run":
+                document = readable_case(self.path).document
+            elif self.kind == "case":
+                document = read_toml(find_input(given, "case"))
+        return replaced_keys(CaseFile, document, self.changes)
+
+    @cached_property
     def finished_run(self) -> Path | None:
         """The directory of the finished run of the case; None if there is none."""
         if self.kind == "run" and not self.changes:
@@ -143,9 +175,18 @@ def find(
         Folder of the run directories.
     changes
         Other values of the case, by dotted keys.
+
+    Raises
+    ------
+    InputError
+        If an argument is of another type.
     """
     if isinstance(given, Reference):
         return given
+    if not isinstance(given, (Case, Mapping)):
+        check_is_path("case", given, "a case, its file, name or tables, or a run")
+    check_is_path("out", out)
+    check_changes(changes)
     kind: NameKind = "case"
     path = Path(out)
     if isinstance(given, (str, Path)):
@@ -177,6 +218,8 @@ def _meanings(path: Path, out: Path, *, is_shipped: bool) -> Iterator[tuple[Name
             yield "run", complete
         if run_directory.is_deck_folder(place) and not is_shipped:
             yield "deck", place
+    for place in _draws_named(path.name, out):
+        yield "run", place
     sweep = out / path.stem
     if (sweep / RECORDS["sweep"]).is_file() and is_sweep_file(path):
         yield "sweep", sweep
@@ -185,6 +228,17 @@ def _meanings(path: Path, out: Path, *, is_shipped: bool) -> Iterator[tuple[Name
     if path.is_dir() and not is_shipped:
         yield "folder", path
     yield "case", path
+
+
+def _draws_named(name: str, out: Path) -> list[Path]:
+    """Finished runs of a name in the directories of spreads and accuracies."""
+    if not run_directory.is_run_name(name):
+        return []
+    draws = []
+    for place in out.glob(f"*/{escape(name)}"):
+        if (place.parent / RECORDS["sweep"]).is_file() and run_directory.is_finished(place):
+            draws.append(place)
+    return draws
 
 
 def is_begun(place: Path) -> bool:

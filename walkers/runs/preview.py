@@ -10,19 +10,36 @@ from dataclasses import asdict
 from math import acos, degrees, isfinite
 from typing import Any
 
+from walkers.inputs.origins import accelerations_in_g
 from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.library import library_of
-from walkers.inputs.resolving.loads import contact_loads, dimer_of, gravity_warnings
+from walkers.inputs.resolving.loads import contact_loads, dimer_of
+from walkers.inputs.resolving.plausibility import implausible
 from walkers.inputs.tables.bodies import Walkers
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.run import CONSTANT
-from walkers.inputs.units import ACCELERATION_OF_ONE_G, MODULUS, parse_quantity
+from walkers.inputs.units import (
+    ACCELERATION_OF_ONE_G,
+    MODULUS,
+    parse_quantity,
+    with_symbols,
+)
 from walkers.physics.capillary import bead_volume, capillary_force_limit_at_wall
 from walkers.physics.time_step import recommended_fractions
 from walkers.rounding import counted, percent
 from walkers.runner.cost import PROGRAM_SECONDS, predicted_overhead, predicted_seconds
 from walkers.runner.process import cores_here
-from walkers.text import aligned, printable
+from walkers.terminal import (
+    ASIDE,
+    HEADING,
+    WARNING,
+    styled,
+    table_width,
+    text_width,
+    wrapped,
+    wrapped_after,
+)
+from walkers.text import aligned_blocks, printable
 
 _BOX_HEIGHT = 2.0
 """Height of the simulation box over the height of the container (``boundary.height``) in it."""
@@ -36,6 +53,12 @@ _LONGER_THAN_RECOMMENDED = 1.01
 """Time step over the longest recommended one, above which a note says so."""
 _OBLIQUE = 1.0
 """Angle of an opening to the horizontal, degrees, above which it is called oblique."""
+_KEY_WIDTH = 19
+"""Width of the keys of values, characters; longer ones shift what follows."""
+_VALUE_WIDTH = 16
+"""Width of the values, characters; longer ones shift what follows."""
+_INDENT = " " * 11
+"""Start of the further lines of a text with a head."""
 _LONGEST_IN_SECONDS = 120.0
 """Longest predicted run time that is printed in seconds, s."""
 
@@ -46,11 +69,11 @@ _LONGEST_IN_SECONDS = 120.0
 def notes(case: Case) -> list[str]:
     """What a user should know about a case before it is run.
 
-    Notes are about a time step that is long or needlessly short, heavy beads, records and few
-    cores; for piles also about beads of a single size and about low walls.
+    Notes are about a time step that is long or needlessly short, heavy beads, drives whose unit may
+    be wrong, records and few cores; for piles also about beads of a single size and low walls.
     """
     lines = _time_step_notes(case)
-    lines += gravity_warnings(case)
+    lines += implausible(case)
     if case.excitation.record:
         lines += case.excitation.record.notes
     cores = cores_here()
@@ -308,57 +331,111 @@ def _dimer(case: Case) -> dict[str, Any]:
 
 
 def preview_text(summary: Mapping[str, Any]) -> str:
-    """The summary of `summarise` as text, in usual units."""
+    """The summary of `summarise` as text, in usual units, in lines that fit the terminal."""
     gravity = summary["case"]["environment"]["gravity"]
-    lines = _text_of_case(summary["case"])
-    lines.append(_text_of_beads(summary["beads"]))
+    texts = {origin["key"]: origin["text"] for origin in summary["case"]["origins"]}
+    paragraphs = [_text_of_beads(summary["beads"])]
     if "vessel" in summary:
-        lines.append(_text_of_vessel(summary["vessel"]))
+        paragraphs.append(_text_of_vessel(summary["vessel"]))
     if "dimer" in summary:
-        lines += _text_of_dimer(summary["dimer"], gravity)
-    lines.append(_text_of_drive(summary["drive"], gravity))
+        paragraphs += _text_of_dimer(summary["dimer"], gravity)
+    drive = summary["drive"]
+    paragraphs.append(_text_of_drive(drive, gravity, in_g=accelerations_in_g(texts)))
+    lines = _text_of_case(summary["case"])
+    for paragraph in paragraphs:
+        lines += wrapped(paragraph, _INDENT)
     if summary["contacts"]:
         lines.append(_text_of_contacts(summary["contacts"]))
-    lines += _text_of_time_step(summary["time_step"], summary["run"]["steps_per_cycle"])
-    lines.append(_text_of_run(summary["run"]))
-    lines += [f"note       {note}" for note in summary["notes"]]
+    for line in _text_of_time_step(summary["time_step"], summary["run"]["steps_per_cycle"]):
+        lines += wrapped(line, _INDENT)
+    lines += wrapped(_text_of_run(summary["run"]), _INDENT)
+    for note in summary["notes"]:
+        lines += wrapped_after("note", f"       {note}", WARNING, _INDENT)
     return "\n".join(lines)
 
 
 def _text_of_case(case: Mapping[str, Any]) -> list[str]:
-    """A resolved case, a line for each value: key, value as in a case file, and origin."""
-    lines = [printable(f"{case['name']}: {case['title']}").rstrip(": ")]
+    """A resolved case, a line for each value: key, value as in a case file, and origin.
+
+    Sources that do not fit into the lines stand below all values.
+    """
+    title = printable(f"{case['name']}: {case['title']}").rstrip(": ")
+    lines = [styled(line, HEADING) for line in wrapped(title, "  ")]
+    footnotes = _Footnotes()
     current_table = None
     for origin in case["origins"]:
         table, _, key = origin["key"].rpartition(".")
         if table != current_table:
-            lines.append(f"  [{table}]")
+            lines.append(styled(f"  [{table}]", HEADING))
             current_table = table
-        lines.append(f"    {key:24} {origin['text']:24} {_origin_text(origin)}".rstrip())
-    return lines
+        lines += _lines_of_value(key, origin, footnotes)
+    return lines + footnotes.lines()
 
 
-def _origin_text(origin: Mapping[str, Any]) -> str:
+class _Footnotes:
+    """Sources that stand below all values, each once."""
+
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+
+    def mark_of(self, text: str) -> str:
+        """The mark of a source, such as ``[2]``."""
+        if text not in self.texts:
+            self.texts.append(text)
+        return f"[{self.texts.index(text) + 1}]"
+
+    def lines(self) -> list[str]:
+        """The sources with their marks."""
+        lines = []
+        for text in self.texts:
+            mark = self.mark_of(text)
+            lines += wrapped(f"  {mark:4} {text}", " " * 7)
+        return [styled(line, ASIDE) for line in lines]
+
+
+def _lines_of_value(key: str, origin: Mapping[str, Any], footnotes: _Footnotes) -> list[str]:
+    """The lines of a value; its source is a footnote if it does not fit into the first one."""
+    value = with_symbols(str(origin["text"]))
+    line = f"    {key:{_KEY_WIDTH}} {value:{_VALUE_WIDTH}}  "
+    space = text_width() - len(line)
+    text = _origin_text(origin)
+    if len(text) <= space:
+        return [line + text]
+    source = str(origin["source"])
+    if source:
+        text = _origin_text({**origin, "source": ""}, footnotes.mark_of(source))
+        if len(text) <= space:
+            return [line + text]
+    indent = " " * (4 + _KEY_WIDTH + 1)
+    return [line.rstrip(), *wrapped(indent + text, indent)]
+
+
+def _origin_text(origin: Mapping[str, Any], mark: str = "") -> str:
     """Origin of a value as text, such as ``library: …`` or ``guessed (not measured), …``.
 
-    Both ends of a range are texts, as in a case file.
+    Parameters
+    ----------
+    origin
+        The origin. Both ends of a range are texts, as in a case file.
+    mark
+        Mark of the footnote that has the source; empty if the source is in the text.
     """
     kind = str(origin["origin"])
     source = str(origin["source"])
     limits = ""
     if origin["range"]:
         low, high = origin["range"]
-        limits = f"range {low} to {high}"
+        limits = with_symbols(f"range {low} to {high}")
     # A default with a range that the case does not declare in [uncertain]: nobody measured it, and
     # the range is that of all materials.
     if kind == "default" and limits and not origin["uncertain"]:
-        return f"guessed ({source or 'not measured'}), general {limits}"
-    if kind in ("calibrated", "assumed"):  # their sources begin with this word
+        return f"guessed ({source or mark or 'not measured'}), general {limits}"
+    if source and kind in ("calibrated", "assumed"):  # their sources begin with this word
         text = source
     elif source:
         text = f"{kind}: {source}"
     else:
-        text = kind
+        text = f"{kind} {mark}".rstrip()
     if origin["uncertain"]:
         text += ", uncertain"
     if limits:
@@ -417,13 +494,17 @@ def _text_of_dimer(dimer: Mapping[str, Any], gravity: float) -> list[str]:
     return lines
 
 
-def _text_of_drive(drive: Mapping[str, Any], gravity: float) -> str:
-    """Peak acceleration, amplitude and peak velocity of the walls."""
-    acceleration = f"a0 = {drive['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g"
-    unit = f"g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {gravity:g} m/s²"
+def _text_of_drive(drive: Mapping[str, Any], gravity: float, *, in_g: bool) -> str:
+    """Peak acceleration, in g or m/s², amplitude and peak velocity of the walls."""
+    acceleration = f"a0 = {drive['peak_acceleration']:.4g} m/s²"
+    if in_g:
+        acceleration = (
+            f"a0 = {drive['peak_acceleration'] / ACCELERATION_OF_ONE_G:.4g} g "
+            f"(g = {ACCELERATION_OF_ONE_G:g} m/s², as in the paper; gravity is {gravity:g} m/s²)"
+        )
     amplitude = f"amplitude {drive['amplitude'] * 1e3:.4g} mm"
     velocity = f"peak velocity {drive['peak_velocity'] * 1e3:.4g} mm/s"
-    return f"drive      {acceleration} ({unit}), {amplitude}, {velocity}"
+    return f"drive      {acceleration}, {amplitude}, {velocity}"
 
 
 def _text_of_contacts(contacts: list[Mapping[str, Any]]) -> str:
@@ -448,7 +529,7 @@ def _text_of_contacts(contacts: list[Mapping[str, Any]]) -> str:
             f"{contact['overlap_at_rest'] * 1e9:.4g} nm",
         ]
         rows.append(cells)
-    return aligned(rows, right=range(1, len(heads)))
+    return aligned_blocks(rows, table_width(), right=range(1, len(heads)))
 
 
 def _text_of_time_step(time_step: Mapping[str, Any], steps_per_cycle: int) -> list[str]:
@@ -456,7 +537,7 @@ def _text_of_time_step(time_step: Mapping[str, Any], steps_per_cycle: int) -> li
     lines = [f"time step  {time_step['step'] * 1e6:.5g} µs, {steps_per_cycle} per cycle"]
     for name, limit in time_step["limits"].items():
         limit_text = "none" if limit is None else f"{limit * 1e6:.4g} µs"
-        share = f"{time_step['share'][name]:.3f} of the limit"
+        share = f"{time_step['share'][name]:.3f} of it"
         auto = f'"auto": at most {time_step["auto"][name]:g}'
         lines.append(f"  {name:10} limit {limit_text:>10}; time step = {share} ({auto})")
     return lines

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from walkers.files import VTK_SCRATCH, abandoned
+from walkers.files import CSV_SCRATCH, VTK_SCRATCH, abandoned
 from walkers.rounding import counted, duration_text
 from walkers.runner import run_directory
 from walkers.runner.manifest import MANIFEST_NAME
@@ -100,9 +100,9 @@ def removal_of(run: ListEntry) -> Removal:
 
 
 def _stale_locks(out: Path) -> list[Path]:
-    """Lock files of runs that no process is computing."""
+    """Lock files of runs that no process is computing, in a folder of runs and in its sweeps."""
     locks = []
-    for lock in sorted(out.glob("*.lock")):
+    for lock in sorted([*out.glob("*.lock"), *out.glob("*/*.lock")]):
         place = lock.with_suffix("")
         if run_directory.is_run_name(place.name) and not run_directory.is_locked(place):
             locks.append(lock)
@@ -117,6 +117,7 @@ def _abandoned_exports(out: Path, runs: Sequence[ListEntry]) -> list[Path]:
     exports = []
     for parent in parents:
         exports += abandoned(parent, VTK_SCRATCH)
+        exports += abandoned(parent, CSV_SCRATCH)
     return exports
 
 
@@ -156,8 +157,13 @@ def remove(removals: Sequence[Removal]) -> dict[Path, str]:
     dict
         Paths that are left, with the reason: a run in progress, or an error of the system.
     """
-    left = {}
-    for removal in removals:
+    left: dict[Path, str] = {}
+    # The directory of a sweep may contain runs.
+    runs_first = sorted(removals, key=lambda removal: removal.kind is RemovalKind.SWEEP)
+    for removal in runs_first:
+        if any(removal.path in path.parents for path in left):
+            left[removal.path] = "kept: it contains a run that is left"
+            continue
         try:
             reason = _remove(removal)
         except OSError as error:

@@ -16,7 +16,8 @@ from typing import Any, TypeVar
 from walkers.errors import expected_of, input_error
 from walkers.postprocess.measure.results import json_numbers
 from walkers.runner.failures import EngineFailure
-from walkers.text import aligned
+from walkers.terminal import styled_status, table_width
+from walkers.text import aligned_blocks
 
 T = TypeVar("T")
 Map = Callable[[Callable[[str], list["Line"]], Iterable[str]], Iterable[list["Line"]]]
@@ -205,8 +206,9 @@ def _table(lines: Iterable[Line]) -> str:
             error = f"error {line.error:.1e} of {line.tolerance:.0e}"
         expected = _number_text(line.expected)
         measured = _number_text(line.measured)
-        rows.append([line.verdict, line.quantity, expected, measured, line.unit, error])
-    return aligned(rows, right=(2, 3))
+        verdict = styled_status(line.verdict)
+        rows.append([verdict, line.quantity, expected, measured, line.unit, error])
+    return aligned_blocks(rows, table_width(), repeated=2, right=(2, 3))
 
 
 def _number_text(value: float) -> str:

@@ -10,6 +10,7 @@ so nothing is extrapolated.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from math import hypot, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,11 +23,11 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.materials import STIFFEST
 from walkers.postprocess.measure.results import recorded
 from walkers.postprocess.measure.sides import STEADY_SPEED
-from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME
+from walkers.postprocess.measure.uncertainty import ACCURACY, ACCURACY_NAME, ACCURACY_TITLE
 from walkers.progress import Tell
 from walkers.runner.binary import find_engine
 from walkers.runner.run_directory import case_of, recomputed, run_place
-from walkers.sweeps.scheduler import SweepOptions, run_sweep
+from walkers.sweeps.scheduler import SweepOptions, SweepPlan, plan_sweep, run_sweep
 from walkers.sweeps.table import SIDES, main_columns, sides_differ, table_of
 from walkers.sweeps.workers import SweepStopped
 
@@ -38,6 +39,8 @@ SHARE = 0.01
 _MODULUS_FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0)
 """Young's moduli, divided by the modulus of the case; with the largest, a run takes 16 times as
 long."""
+_FIRST_FACTORS = 3
+"""Number of the factors that are tried in any case, if the case allows them."""
 _LEAST_INCREASE = 1.25
 """Smallest factor of a last increase of the modulus, to the largest one of a case."""
 _FAMILIES = (
@@ -61,7 +64,7 @@ def measure_accuracy(
 ) -> dict[str, Any]:
     """Make the runs that measure the numerical errors of a finished run, and record the errors.
 
-    Finished runs are used again.
+    They are made in the directory of the sweep ``RUN-accuracy``. Finished runs are used again.
 
     Parameters
     ----------
@@ -95,9 +98,10 @@ def measure_accuracy(
     case = case_of(directory)
     possible = modulus_factors(case)
     _check_is_current(case, directory, engine)
+    options = replace(options, own_runs=True)
     numbers = recorded(directory)["numbers"]
     # The modulus is increased at least twice if the case allows it, and further only if necessary.
-    for last in range(min(2, len(possible) - 1), len(possible)):
+    for last in range(min(_FIRST_FACTORS, len(possible)) - 1, len(possible)):
         sweep = _convergence_sweep(case, f"{directory.name}{ACCURACY}", possible[: last + 1])
         record, failures = run_sweep(
             sweep, directory.parent, options, engine=engine, on_progress=on_progress
@@ -122,6 +126,27 @@ def measure_accuracy(
     with recomputed(directory, [ACCURACY_NAME]):
         write_json(directory / ACCURACY_NAME, accuracy)
     return accuracy
+
+
+def plan_accuracy(
+    case: Case, directory: Path, options: SweepOptions, engine: str | None = None
+) -> SweepPlan:
+    """Plan the first runs that measure the numerical errors of a run; nothing is written.
+
+    More follow if the velocities still change then.
+
+    Parameters
+    ----------
+    case
+        The case of the run.
+    directory
+        The final directory of the run, which need not exist.
+    options, engine
+        As for `measure_accuracy`.
+    """
+    factors = modulus_factors(case)[:_FIRST_FACTORS]
+    sweep = _convergence_sweep(case, f"{directory.name}{ACCURACY}", factors)
+    return plan_sweep(sweep, directory.parent, replace(options, own_runs=True), engine)
 
 
 def _check_is_current(case: Case, directory: Path, engine: str | None) -> None:
@@ -185,7 +210,7 @@ def _convergence_sweep(case: Case, name: str, factors: Sequence[float]) -> Sweep
         time_steps.append(f"{shorter * step!r} us")
         moduli.append(f"{min(factor * modulus, largest)!r} MPa")
     file = {
-        "title": f"{case.title or case.name}: smaller time steps and harder beads",
+        "title": f"{case.title or case.name}{ACCURACY_TITLE}",
         "case": case.name,
         "zip": [{"run.time_step": time_steps, "contact.youngs_modulus": moduli}],
     }

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from walkers.files import write_bytes
+from walkers.postprocess.measure.uncertainty import OF_OTHERS
 from walkers.postprocess.show.drawing import (
     TWO_COLUMNS,
     letter_panels,
@@ -22,7 +23,8 @@ from walkers.postprocess.show.drawing import (
 )
 from walkers.rounding import percent
 from walkers.sweeps.climbing import CONFIDENCE, DRAWS, PARTS, WALLS_OF_CORNER
-from walkers.text import aligned
+from walkers.terminal import table_width
+from walkers.text import aligned_with_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,8 +104,10 @@ def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
         "height (mm)": _range_text(climbs["heights"], 1e3),
         "speed (mm/s)": _range_text(climbs["speeds"], 1e3),
         "median speed (mm/s)": _two_digits(median_speed),
-        "guessed": ", ".join(climbs.get("guessed", [])) or _MISSING,
+        "guessed": _MISSING,
     }
+    if climbs.get("guessed"):
+        texts["guessed"] = f"{', '.join(climbs['guessed'])} ({OF_OTHERS})"
     return texts
 
 
@@ -136,7 +140,7 @@ def describe_climbs(climbs: Sequence[Mapping[str, Any]]) -> str:
     for condition in climbs:
         texts = texts_of(condition)
         rows = [[name, text] for name, text in texts.items() if text != _MISSING]
-        blocks.append(aligned(rows))
+        blocks.append(aligned_with_text(rows, table_width()))
     note = f"rates per run and second; in brackets {percent(CONFIDENCE)} confidence"
     return "\n\n".join([*blocks, note])
 
@@ -149,7 +153,8 @@ def climbing_table(climbs: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
     pandas.DataFrame
         For each ``condition`` a row for all climbs, for those on plain walls and for those in
         corners (``where``). The ends of intervals have columns of their own, such as ``rate_low``
-        and ``rate_high``; NaN where there is no interval.
+        and ``rate_high``; NaN where there is no interval. ``guessed`` has the values of the case
+        that were guessed.
     """
     import pandas as pd
 
@@ -158,6 +163,7 @@ def climbing_table(climbs: Sequence[Mapping[str, Any]]) -> pd.DataFrame:
         for subset in _SUBSETS:
             row = {"condition": condition["condition"], "where": subset.label}
             row |= _table_row(subset.numbers_in(condition))
+            row["guessed"] = ", ".join(condition.get("guessed", []))
             rows.append(row)
     return pd.DataFrame(rows)
 

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray
 from walkers.errors import expected_of, input_error
 from walkers.inputs.resolving.library import unmeasured
 from walkers.postprocess.measure.numbers import draws_text
 from walkers.postprocess.show.drawing import (
-    TWO_COLUMNS,
     errors_seen,
     letter_panels,
     new_figure,
@@ -25,19 +25,24 @@ from walkers.postprocess.show.drawing import (
 )
 from walkers.runs.status import status_text
 from walkers.sweeps.correlations import rank_correlations
-from walkers.sweeps.factors import Factor
+from walkers.sweeps.factors import Factor, number_factor
+from walkers.sweeps.figure_format import FigureFormat
 from walkers.sweeps.figure_options import FigureOptions, Log
 from walkers.sweeps.layout import FigureLayout, figure_layout
 from walkers.sweeps.left_out import warn_left_out
+from walkers.sweeps.own_points import OwnPoints, PointsFile, read_points
 from walkers.sweeps.predictions import Predict, Theory
 from walkers.sweeps.scales import scale_x, scale_y
 from walkers.sweeps.series import (
+    LEGEND_LETTERS_PER_INCH,
     Colours,
     Series,
     category_offset,
     draw_legend,
+    draw_own_points,
     draw_series,
     draw_theory,
+    own_styles,
     points_of,
 )
 from walkers.sweeps.table import FACING_DOWN, SweepTable, default_column, find_name
@@ -92,6 +97,8 @@ def figure_of(
     """
     if options.log and options.log not in get_args(Log):
         raise input_error("log", f"{options.log!r}: {expected_of(options.log, get_args(Log))}")
+    figure_format = FigureFormat.of_options(options)
+    point_files = [read_points(argument) for argument in options.data_files]
     frame = table.frame
     column = column_of(frame, options.y)
     finished = table.finished
@@ -104,7 +111,15 @@ def figure_of(
         raise input_error("log", f"{layout.x_factors[0].label} has no numbers")
     theory = Theory.at_points(table, column, log, predict) if predict else None
     down = None if options.y else FACING_DOWN.get(column)
-    content = _Content(finished=finished, column=column, down=down, layout=layout, theory=theory)
+    content = _Content(
+        finished=finished,
+        column=column,
+        down=down,
+        layout=layout,
+        theory=theory,
+        point_files=point_files,
+        format=figure_format,
+    )
     return _draw(content, log)
 
 
@@ -144,6 +159,10 @@ class _Content:
         Which factors are on the x axis, in colours and in panels.
     theory
         The predictions of models, if they are drawn.
+    point_files
+        The files of the user's own points.
+    format
+        Width, size of texts and title.
     """
 
     finished: pd.DataFrame
@@ -151,6 +170,8 @@ class _Content:
     down: str | None
     layout: FigureLayout
     theory: Theory | None
+    point_files: Sequence[PointsFile]
+    format: FigureFormat
 
 
 @dataclass(frozen=True)
@@ -165,35 +186,102 @@ class _Panel:
         Which of the finished points it shows, shape (N,).
     title
         Its title.
+    own_points
+        The user's own points of each file; None of a file without a column of the x axis.
     """
 
     x: Factor
     drawn: npt.NDArray[np.bool_]
     title: str = ""
+    own_points: Sequence[OwnPoints | None] = ()
+
+    @property
+    def own_places(self) -> list[float]:
+        """Places of the user's own points on the x axis."""
+        places: list[float] = []
+        for points in self.own_points:
+            if points is not None:
+                places += points.x.tolist()
+        return places
 
 
 @styled
 def _draw(content: _Content, log: str) -> Figure:
     """Draw a figure, with logarithmic axes for the letters in ``log``."""
+    with content.format.in_style():
+        figure = _drawn(content, log)
+        content.format.finish(figure)
+        return figure
+
+
+def _drawn(content: _Content, log: str) -> Figure:
+    """Draw a figure whose texts have the sizes of the current style."""
     finished = content.finished
     column = content.column
     theory = content.theory
     label, points = points_of(finished, column, content.down)
     panels, remark = _panels_of(content)
+    panels = _with_own_points(panels, content)
     colours = Colours.of_factor(content.layout.hue, hollow=theory is not None)
-    figure, grid = _empty_grid(len(panels), share_x=len(content.layout.x_factors) == 1)
+    styles = own_styles([file.label for file in content.point_files], colours)
+    figure, grid = _empty_grid(
+        len(panels), content.format, share_x=len(content.layout.x_factors) == 1
+    )
     for axes, panel in zip(grid.flat, panels, strict=False):
         _draw_panel(axes, panel, colours, points, theory)
-        scale_x(axes, panel.x, log)
+        for own_points, style in zip(panel.own_points, styles, strict=True):
+            if own_points is not None:
+                draw_own_points(axes, own_points, style)
+        scale_x(axes, panel.x, log, panel.own_places)
     _label_panels(grid, panels, label)
     models = theory.values if theory else {}
-    scale_y(grid[0, 0], points, list(models.values()), log)
+    scale_y(grid[0, 0], points, list(models.values()), log, _own_ends(panels))
     band = ""
     if "low" in points:
         band = f"{_BAND}, 5 to 95 % of {_number_of_draws_text(finished, column)}"
-    draw_legend(figure, colours, list(models), down="down" in points, band=band)
-    _draw_title(figure, [finished.attrs["title"], remark, *_remarks(finished, points, band)])
+    draw_legend(
+        figure,
+        colours,
+        list(models),
+        styles,
+        down="down" in points,
+        band=band,
+        letters=content.format.letters(LEGEND_LETTERS_PER_INCH),
+    )
+    title = [finished.attrs["title"], remark, *_remarks(finished, points, band)]
+    if content.format.title is not None:
+        title = [content.format.title]
+    _draw_title(figure, title, content.format.letters(_LETTERS_PER_INCH))
     return figure
+
+
+def _with_own_points(panels: Sequence[_Panel], content: _Content) -> list[_Panel]:
+    """The panels with the user's own points; `InputError` for a file that belongs to none."""
+    if not content.point_files:
+        return list(panels)
+    y = number_factor(content.finished, content.column, "y")
+    for file in content.point_files:
+        file.check_columns(content.layout.x_factors, y)
+    if content.layout.panels is not None:
+        warn_left_out(f"the points of --data are drawn in each of the {len(panels)} panels")
+    drawn = []
+    for panel in panels:
+        own_points = [file.points_of(panel.x, y) for file in content.point_files]
+        drawn.append(replace(panel, own_points=own_points))
+    return drawn
+
+
+def _own_ends(panels: Sequence[_Panel]) -> FloatArray:
+    """Both ends of the error bars of all of the user's own points, shape (N,)."""
+    ends = [np.array([])]
+    for panel in panels:
+        for points in panel.own_points:
+            if points is not None:
+                error = np.zeros(len(points.y))
+                if points.y_error is not None:
+                    error = np.nan_to_num(points.y_error)
+                ends += [points.y - error, points.y + error]
+    return np.concatenate(ends)
 
 
 def _panels_of(content: _Content) -> tuple[list[_Panel], str]:
@@ -253,16 +341,18 @@ def _with_usual_others(x: Factor, x_factors: Sequence[Factor]) -> npt.NDArray[np
     return np.array(is_changed[x.keys] | (changes == 0))
 
 
-def _empty_grid(number: int, *, share_x: bool) -> tuple[Figure, npt.NDArray[Any]]:
+def _empty_grid(
+    number: int, figure_format: FigureFormat, *, share_x: bool
+) -> tuple[Figure, npt.NDArray[Any]]:
     """A figure with axes for a number of panels, which share the y axis; further axes are off."""
-    columns = min(number, _MOST_COLUMNS)
-    if number == 4:  # two rows of two, rather than of three and one
+    columns = min(number, figure_format.most_columns(_MOST_COLUMNS))
+    if number == 4 and columns > 2:  # two rows of two, rather than of three and one
         columns = 2
     rows = ceil(number / columns)
     height = _ONE_PANEL
     if number > 1:  # square panels, and room for title and legend
         height = 6.0 / columns * rows + 0.9
-    figure = new_figure(TWO_COLUMNS, height)
+    figure = new_figure(figure_format.width, height)
     grid = figure.subplots(rows, columns, sharex=share_x, sharey=True, squeeze=False)
     for axes in grid.flat[number:]:
         axes.set_axis_off()
@@ -336,10 +426,11 @@ def _remarks(finished: pd.DataFrame, points: pd.DataFrame, band: str) -> list[st
     return remarks
 
 
-def _draw_title(figure: Figure, texts: Sequence[str]) -> None:
-    """Texts above all panels, each on lines of its own."""
-    width = round(_LETTERS_PER_INCH * figure.get_figwidth())
+def _draw_title(figure: Figure, texts: Sequence[str], letters: int) -> None:
+    """Texts above all panels, each on lines of its own of so many letters."""
     lines = []
     for text in texts:
-        lines += wrap(text, width)
+        lines += wrap(text, letters)
+    if not lines:
+        return
     figure.suptitle(plain_text("\n".join(lines)))

@@ -5,10 +5,14 @@ Nothing that takes long is imported.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from pathlib import Path
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
+
+from walkers.errors import check_is_path
 
 Log = Literal["x", "y", "xy"]
 """Letters of logarithmic axes."""
@@ -34,6 +38,16 @@ class FigureOptions:
         Sweeps: which axes are logarithmic.
     theory
         Sweeps: also draw the theory.
+    data_files
+        Sweeps: also draw points of your own, from a text file with a header such as
+        "peak_acceleration (g),velocity (mm/s),velocity error (mm/s)", or LABEL=FILE. Repeatable.
+    width
+        Sweeps: width of the figure, such as 85mm; default: 7in.
+    font_size
+        Sweeps: size of all texts, points; default: 7 and 8.
+    title
+        Sweeps: text above the figure, or none; default: the title of the sweep, and what bars and
+        bands are.
     """
 
     x: str | None = None
@@ -42,3 +56,21 @@ class FigureOptions:
     panels: str | None = None
     log: Log | None = None
     theory: bool = False
+    data_files: Annotated[
+        Sequence[str | Path], Parameter("--data", metavar="FILE", show_default=False)
+    ] = ()
+    width: str | None = None
+    font_size: float | None = None
+    title: str | None = None
+
+    def __post_init__(self) -> None:
+        """Raise `InputError` for names that are not text."""
+        names = {"x": self.x, "y": self.y, "hue": self.hue, "panels": self.panels}
+        for argument, name in names.items():
+            if name is not None:
+                check_is_path(argument, name, "the name of a key or a column")
+        files = self.data_files
+        for file in files if isinstance(files, (list, tuple)) else [files]:
+            check_is_path("data_files", file, "a file, or LABEL=FILE")
+        if self.width is not None:
+            check_is_path("width", self.width, "a width, such as 85mm")

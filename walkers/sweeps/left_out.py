@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
+from walkers.warning import warn_user
 
 
 class LeftOutWarning(UserWarning):
@@ -14,4 +14,4 @@ class LeftOutWarning(UserWarning):
 
 def warn_left_out(message: str) -> None:
     """Warn that something is not in a figure."""
-    warnings.warn(message, LeftOutWarning, stacklevel=3)
+    warn_user(message, LeftOutWarning)

@@ -9,13 +9,18 @@ from pathlib import Path
 from typing import Any
 
 from walkers.errors import InputError
-from walkers.postprocess.measure.uncertainty import ACCURACY, SPREAD
+from walkers.postprocess.measure.uncertainty import (
+    ACCURACY,
+    ACCURACY_TITLE,
+    SPREAD,
+    SPREAD_TITLE,
+)
 from walkers.rounding import counted
 from walkers.runs.case_text import FlatCase
 from walkers.runs.listing import ListEntry, by_case, bytes_text, folders_in, runs_in
 from walkers.runs.status import status_text, worst_status
 from walkers.sweeps.record import RECORD_NAME, read_sweep_record, states
-from walkers.text import aligned
+from walkers.text import fitted_table
 
 
 def inventory(out: Path) -> list[ListEntry]:
@@ -54,7 +59,8 @@ def _entry_of_sweep(path: Path, sizes: Mapping[str, int]) -> ListEntry | None:
         return None
     points = Counter(state.status for state in states(record))
     size = 0
-    for run in set(record.runs):
+    runs = record.names_in_folder
+    for run in set(runs):
         size += sizes.get(run, 0)
     sweep = record.sweep
     numbers_of_values = FlatCase()
@@ -70,8 +76,9 @@ def _entry_of_sweep(path: Path, sizes: Mapping[str, int]) -> ListEntry | None:
         age=max(time.time() - (path / RECORD_NAME).stat().st_mtime, 0.0),
         size=size,
         points=dict(points),
-        runs=list(record.runs),
+        runs=runs,
         parameters=numbers_of_values,
+        title=sweep.title,
     )
 
 
@@ -84,16 +91,32 @@ def run_of_sweep(sweep: str) -> str:
 
 
 def without_members(contents: Sequence[ListEntry]) -> list[ListEntry]:
-    """Contents of a folder without the runs of sweeps.
+    """Contents of a folder without the runs of sweeps that nobody has asked for by themselves.
 
-    Runs that have a spread or an accuracy of their own remain.
+    Spreads and accuracies of the hidden runs are left out, too.
     """
     members: set[str] = set()
     for sweep in contents:
         members.update(sweep.runs or ())
     for entry in contents:
-        members.discard(run_of_sweep(entry.name))
-    return [entry for entry in contents if entry.name not in members]
+        if entry.requested:
+            members.discard(entry.name)
+    left = [entry for entry in contents if entry.name not in members]
+    return [entry for entry in left if run_of_sweep(entry.name) not in members]
+
+
+def without_draws(contents: Sequence[ListEntry]) -> list[ListEntry]:
+    """Contents of a folder without the runs that spreads and accuracies alone have made."""
+    draws: set[str] = set()
+    asked_for: set[str] = set()
+    for entry in contents:
+        if run_of_sweep(entry.name):
+            draws.update(entry.runs or ())
+        else:
+            asked_for.update(entry.runs or ())
+        if entry.requested:
+            asked_for.add(entry.name)
+    return [entry for entry in contents if entry.name not in draws - asked_for]
 
 
 def as_json(contents: Sequence[ListEntry]) -> list[dict[str, Any]]:
@@ -110,14 +133,17 @@ def as_json(contents: Sequence[ListEntry]) -> list[dict[str, Any]]:
         else:
             keys = keys_by_case[entry.case]
         row = vars(entry) | {"directory": str(entry.directory)}
-        del row["parameters"]
+        for name in ("parameters", "title", "requested"):
+            del row[name]
         row["varies"] = {key: entry.parameters.get(key) for key in keys}
         rows.append(row)
     return rows
 
 
-def listing_text(contents: Sequence[ListEntry], hidden: int = 0) -> str:
+def listing_text(contents: Sequence[ListEntry], hidden: int = 0, width: int | None = None) -> str:
     """Entries as text: sweeps, then the runs of each case; velocities in mm/s.
+
+    Spreads and accuracies are named by the condition of their run.
 
     Parameters
     ----------
@@ -125,29 +151,46 @@ def listing_text(contents: Sequence[ListEntry], hidden: int = 0) -> str:
         The entries.
     hidden
         Number of runs of sweeps that are not among them, for the last line.
+    width
+        Width to which the tables are fitted, characters; None: a line for each entry.
     """
-    sweeps = _of_kind("sweep", contents)
+    sweeps = [entry for entry in _of_kind("sweep", contents) if not run_of_sweep(entry.name)]
+    companions = [entry for entry in _of_kind("sweep", contents) if run_of_sweep(entry.name)]
     runs = _of_kind("run", contents)
     blocks = []
     totals = [counted(len(runs), "run")]
     if sweeps:
-        blocks.append(_sweeps_text(sweeps))
+        blocks.append(_sweeps_text(sweeps, width))
         totals.insert(0, counted(len(sweeps), "sweep"))
-    blocks += [group.as_text() for group in by_case(runs)]
+    if companions:
+        blocks.append(_companions_text(companions, width))
+        names = "spread or accuracy" if len(companions) == 1 else "spreads and accuracies"
+        totals.append(f"{len(companions)} {names}")
+    blocks += [group.as_text(width) for group in by_case(runs)]
     total = f"{', '.join(totals)}, {bytes_text(sum(entry.size for entry in contents))}"
     if hidden:
         total += f"; not shown: {hidden} runs of sweeps (--all)"
     return "\n\n".join([*blocks, total])
 
 
-def _sweeps_text(sweeps: Sequence[ListEntry]) -> str:
+def _sweeps_text(sweeps: Sequence[ListEntry], width: int | None) -> str:
     """Sweeps as text, a line each, with the number of values of each varied key."""
     lines = [["sweep", "points", "age", "size", "case", "varies (values)"]]
     for sweep in sweeps:
         varied = [f"{key} ({count})" for key, count in sweep.parameters.items()]
         status = status_text(sweep.points or {})
         lines.append([sweep.name, status, *sweep.age_and_size, sweep.case, ", ".join(varied)])
-    return aligned(lines)
+    return fitted_table(lines, len(lines[0]) - 1, width, styled_column=1)
+
+
+def _companions_text(companions: Sequence[ListEntry], width: int | None) -> str:
+    """Spreads and accuracies as text, a line each, with the condition whose runs they are."""
+    lines = [["spread or accuracy", "points", "age", "size", "of"]]
+    for sweep in companions:
+        condition = sweep.title.removesuffix(SPREAD_TITLE).removesuffix(ACCURACY_TITLE)
+        status = status_text(sweep.points or {})
+        lines.append([sweep.name, status, *sweep.age_and_size, condition or sweep.case])
+    return fitted_table(lines, len(lines[0]) - 1, width, styled_column=1)
 
 
 def _of_kind(kind: str, contents: Sequence[ListEntry]) -> list[ListEntry]:

@@ -3,7 +3,7 @@
 A sweep's directory contains ``sweep.json``: the tables of the sweep's file and of its base case,
 and the names of its runs. Reading expands the file again. The status of a point is the status of
 its run directory. The run directories are beside the sweep's directory, and all sweeps of a folder
-share them.
+share them. Those of a spread or an accuracy, for which nobody asked by name, are in its directory.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from walkers.errors import InputError, input_error
 from walkers.files import make_folder, read_json, write_json
 from walkers.postprocess.measure.results import read_results
+from walkers.runner.run_directory import is_finished
 from walkers.runs.status import PointState, state_at
 
 if TYPE_CHECKING:
@@ -41,16 +42,41 @@ class SweepRecord:
         The sweep.
     runs
         The name of the run of each point.
+    has_own_runs
+        Whether its runs are made in its directory instead of beside it.
     """
 
     directory: Path
     sweep: SweepDefinition
     runs: Sequence[str]
+    has_own_runs: bool = False
 
     @property
-    def out(self) -> Path:
-        """Folder of the run directories."""
-        return self.directory.parent
+    def runs_folder(self) -> Path:
+        """Folder in which missing runs are made."""
+        return self.directory if self.has_own_runs else self.directory.parent
+
+    def place_of(self, run: str) -> Path:
+        """The final directory of a run.
+
+        A finished run beside the directory of the sweep is used wherever missing runs are made.
+        """
+        place = self.runs_folder / run
+        beside = self.directory.parent / run
+        if self.has_own_runs and not is_finished(place) and is_finished(beside):
+            return beside
+        return place
+
+    @property
+    def places(self) -> list[Path]:
+        """The final directory of the run of each point."""
+        return [self.place_of(run) for run in self.runs]
+
+    @property
+    def names_in_folder(self) -> list[str]:
+        """Names of the runs in the folder of the sweep: paths relative to that folder."""
+        folder = self.directory.parent
+        return [place.relative_to(folder).as_posix() for place in self.places]
 
 
 def write_record(record: SweepRecord) -> None:
@@ -64,6 +90,8 @@ def write_record(record: SweepRecord) -> None:
         "base": dict(sweep.base),
         "runs": list(record.runs),
     }
+    if record.has_own_runs:
+        contents["own_runs"] = True
     write_json(record.directory / RECORD_NAME, contents)
 
 
@@ -105,7 +133,7 @@ def _read_record(directory: str | Path) -> SweepRecord:
     runs = contents["runs"]
     if len(runs) != len(sweep.rows) or not all(isinstance(run, str) for run in runs):
         raise ValueError(f"{len(runs)} runs, expected the names of {len(sweep.rows)}")
-    return SweepRecord(resolved, sweep, runs)
+    return SweepRecord(resolved, sweep, runs, has_own_runs=bool(contents.get("own_runs")))
 
 
 def states(record: SweepRecord, *, results: bool = False) -> list[PointState]:
@@ -120,8 +148,8 @@ def states(record: SweepRecord, *, results: bool = False) -> list[PointState]:
         cannot be read has failed.
     """
     points = []
-    for run in record.runs:
-        state = state_at(record.out / run)
+    for place in record.places:
+        state = state_at(place)
         if results:
             state = _with_result(state)
         points.append(state)

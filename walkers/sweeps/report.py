@@ -47,7 +47,7 @@ def report_sweep(table: SweepTable, path: Path) -> Path:
     Raises
     ------
     InputError
-        If the path is not that of an HTML file in an existing folder.
+        If the path is not that of an HTML file, or its folder cannot be made.
     """
     check_report(path)
     frame = table.frame

@@ -29,7 +29,7 @@ _LEAST_RANGE = 1e-4
 """Smallest range of the y axis relative to the mean, so that rounding errors are not shown."""
 
 
-def scale_x(axes: Axes, x: Factor, log: str) -> None:
+def scale_x(axes: Axes, x: Factor, log: str, further: Sequence[float] = ()) -> None:
     """Set scale and ticks of an x axis.
 
     Parameters
@@ -40,6 +40,8 @@ def scale_x(axes: Axes, x: Factor, log: str) -> None:
         The factor on the x axis. If its range is log-uniform, the axis is logarithmic.
     log
         Letters of logarithmic axes.
+    further
+        Places of the user's own points, in the unit of the axis.
     """
     if not x.is_number:
         _name_categories(axes, x)
@@ -47,7 +49,7 @@ def scale_x(axes: Axes, x: Factor, log: str) -> None:
     is_log = x.is_log or "x" in log
     if is_log:
         axes.set_xscale("log")
-    if _has_few_values(x):
+    if _has_few_values(x, further):
         labels = [f"{x.without_rounding(level):.4g}" for level in x.levels]
         axes.set_xticks(x.levels, labels)
         axes.set_xticks([], minor=True)
@@ -68,9 +70,11 @@ def _name_categories(axes: Axes, x: Factor) -> None:
     axes.set_xlim(-0.6, len(x.levels) - 0.4)  # categories are at 0, 1, 2, …
 
 
-def _has_few_values(x: Factor) -> bool:
-    """Whether each value has a tick: there are few, and they are not too close."""
+def _has_few_values(x: Factor, further: Sequence[float]) -> bool:
+    """Whether each value has a tick: there are few, not too close, and no further one is beyond."""
     if x.is_sample or len(x.levels) > _FEW_TICKS:
+        return False
+    if any(not x.levels[0] <= place <= x.levels[-1] for place in further):
         return False
     distances = np.diff(x.levels)
     least = _TICK_DISTANCE * (x.levels[-1] - x.levels[0])
@@ -100,7 +104,13 @@ def _tick_linear(axes: Axes, x: Factor) -> None:
     axes.xaxis.set_major_locator(locator)
 
 
-def scale_y(axes: Axes, points: pd.DataFrame, models: Sequence[FloatArray], log: str) -> None:
+def scale_y(
+    axes: Axes,
+    points: pd.DataFrame,
+    models: Sequence[FloatArray],
+    log: str,
+    further: FloatArray | None = None,
+) -> None:
     """Set scale and range of the y axis.
 
     With margins, the range contains the points, their error bars and bands, all predictions of the
@@ -116,6 +126,8 @@ def scale_y(axes: Axes, points: pd.DataFrame, models: Sequence[FloatArray], log:
         Predictions for the points, shape (N,) each.
     log
         Letters of logarithmic axes.
+    further
+        Ends of the error bars of the user's own points, which the range contains too.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -127,6 +139,9 @@ def scale_y(axes: Axes, points: pd.DataFrame, models: Sequence[FloatArray], log:
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         low -= 0.5
         high += 0.5
+    if further is not None and len(further):
+        low = min(low, float(np.nanmin(further)))
+        high = max(high, float(np.nanmax(further)))
     low, high = _widened(low, high)
     margin = _MARGIN * (high - low)
     axes.set_ylim(low - margin, high + margin)

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import resource
 import time
-import warnings
 from collections import Counter
 from collections.abc import Collection, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
@@ -64,7 +63,9 @@ from walkers.sweeps.workers import (
     pilots,
     threads,
 )
+from walkers.terminal import fitted_lines
 from walkers.text import with_unit
+from walkers.warning import warn_user
 
 if TYPE_CHECKING:
     from parsl.config import Config
@@ -105,6 +106,8 @@ class SweepOptions:
         Number of MPI processes of a deck.
     dumps
         Whether runs keep their dumps.
+    own_runs
+        Whether the runs are made in the directory of the sweep instead of beside it.
     """
 
     workers: int | None = None
@@ -114,6 +117,7 @@ class SweepOptions:
     final: frozenset[str] = frozenset()
     ranks: int = 1
     dumps: bool = True
+    own_runs: bool = False
 
     @property
     def decks_at_once(self) -> int:
@@ -229,7 +233,7 @@ class SweepPlan:
             f"{duration_text(self.wall_seconds)} with {at_once} in parallel",
             f"  directory  {self.record.directory}",
         ]
-        return "\n".join(lines)
+        return fitted_lines(lines)
 
 
 def plan_sweep(
@@ -258,7 +262,7 @@ def plan_sweep(
         problem = Problem("descend", None, "expected walkers: a pile has no velocity")
         raise InputError(sweep.source, [problem])
     runs = [run_place(case, binary, out).name for case in cases]
-    record = SweepRecord(out / sweep.name, sweep, runs)
+    record = SweepRecord(out / sweep.name, sweep, runs, has_own_runs=options.own_runs)
     if options.site is not None:
         check_path(record.directory)
     point_states = states(record)
@@ -399,18 +403,16 @@ def _warn_if_replaced(record: SweepRecord) -> None:
     with suppress(InputError):  # no sweep of this name, or none that can be read
         earlier = read_sweep_record(record.directory)
         if set(earlier.runs).isdisjoint(record.runs):
-            warnings.warn(
+            warn_user(
                 f"{record.directory}: replaces a sweep of the same name without common runs; "
                 "figures and reports there show the old one",
                 SweepReplacedWarning,
-                stacklevel=3,
             )
 
 
 def _measure_finished(record: SweepRecord) -> None:
     """Measure finished runs again whose results are out of date."""
-    for run in set(record.runs):
-        place = record.out / run
+    for place in set(record.places):
         if is_finished(place):
             # A run that cannot be measured is among the failures.
             with suppress(WalkersError, OSError, ValueError):
@@ -498,7 +500,7 @@ class _SweepLoop:
         task = DeckTask(
             runs=[self.record.runs[point] for point in deck.points],
             cases=[self.plan.cases[point] for point in deck.points],
-            out=self.record.out,
+            out=self.record.runs_folder,
             engine=self.plan.engine,
             time_limit=self.plan.options.time_limit,
             dumps=self.plan.options.dumps,
@@ -587,7 +589,7 @@ class _SweepLoop:
 
     def _place_of(self, deck: PlannedDeck) -> Path:
         """The run directory of the first point of a deck."""
-        return self.record.out / self.record.runs[deck.points[0]]
+        return self.record.runs_folder / self.record.runs[deck.points[0]]
 
     def _seconds_left(self) -> float:
         """Predicted time on one core of what is left of all decks, s."""

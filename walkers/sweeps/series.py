@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy.typing as npt
 from walkers.postprocess.measure.quantities import LABELS, scatter_of
 from walkers.postprocess.show.drawing import errors_seen, plain_text
 from walkers.sweeps.factors import Factor, number_factor
+from walkers.sweeps.own_points import OwnPoints
 from walkers.sweeps.predictions import Theory
 from walkers.sweeps.table import SEEDS
 
@@ -37,10 +39,14 @@ _MOST_COLOURS = 10
 """Number of colours in the style of the project."""
 _LARGEST_OFFSET = 0.12
 """Largest distance of the symbols of two colours in a category; categories have the distance 1."""
-_LETTERS_PER_INCH = 13.0
+LEGEND_LETTERS_PER_INCH = 13.0
 """Letters of a line of the legend, per inch of the figure."""
 _LETTERS_OF_SYMBOL = 6
 """Space of a symbol in the legend, in letters."""
+_OWN_MARKERS = "Ds^vPX"
+"""Symbols of the user's own points."""
+_SIMULATION = "simulation"
+"""Entry of the legend for points of one colour beside the user's own."""
 _BAND_OPACITY = 0.25
 """Opacity of bands, from 0 to 1."""
 
@@ -234,6 +240,47 @@ def _draw_band(axes: Axes, series: Series, shown: pd.DataFrame, colour: Any) -> 
         axes.vlines(series.places, low, high, color=colour, alpha=_BAND_OPACITY, zorder=0.5, lw=4.0)
 
 
+def own_styles(labels: Sequence[str], colours: Colours) -> list[Style]:
+    """Colours and symbols of the user's own points: white symbols, and colours that are left.
+
+    Parameters
+    ----------
+    labels
+        Their entries in the legend.
+    colours
+        The colours of the points of the sweep.
+    """
+    used = len(colours.styles)
+    palette = _colours(used + len(labels))
+    styles = []
+    for number, label in enumerate(labels):
+        styles.append(
+            {
+                "marker": _OWN_MARKERS[number % len(_OWN_MARKERS)],
+                "color": palette[used + number],
+                "mfc": "white",
+                "ms": 4.5,
+                "label": plain_text(label),
+            }
+        )
+    return styles
+
+
+def draw_own_points(axes: Axes, points: OwnPoints, style: Style) -> None:
+    """Draw the user's own points with their error bars, before those of the sweep."""
+    axes.errorbar(
+        points.x,
+        points.y,
+        xerr=points.x_error,
+        yerr=points.y_error,
+        ls="none",
+        lw=0.9,
+        capsize=2,
+        zorder=3.0,
+        **style,
+    )
+
+
 def draw_theory(axes: Axes, series: Series, theory: Theory, colour: Any) -> None:
     """Draw the predictions of all models for a series."""
     x = series.x if series.is_line else None
@@ -249,8 +296,15 @@ def _model_style(number: int, is_line: bool, colour: Any) -> Style:
     return {"color": colour, "lw": 0.9, "ls": "none", "marker": _MODEL_MARKERS[number], "ms": 9}
 
 
-def draw_legend(
-    figure: Figure, colours: Colours, models: Sequence[str] = (), *, down: bool, band: str
+def draw_legend(  # noqa: PLR0913
+    figure: Figure,
+    colours: Colours,
+    models: Sequence[str] = (),
+    point_styles: Sequence[Style] = (),
+    *,
+    down: bool,
+    band: str,
+    letters: int,
 ) -> None:
     """Draw a legend of colours, models and bands below all panels, if there is any to explain.
 
@@ -262,14 +316,21 @@ def draw_legend(
         The colours.
     models
         Names of the models.
+    point_styles
+        Styles of the user's own points, from `own_styles`.
     down
         Whether walkers that face down are a series beside those that face up.
     band
         What the bands are; empty: there are none.
+    letters
+        Letters of a line as wide as the figure.
     """
     from matplotlib.lines import Line2D
 
     handles = _colour_handles(colours)
+    if point_styles and not handles:
+        (style,) = colours.styles.values()
+        handles.append(Line2D([], [], ls="none", label=_SIMULATION, **style))
     if down:
         handles.append(Line2D([], [], ls="none", **_UP))
         handles.append(Line2D([], [], ls="none", mfc="none", **_DOWN))
@@ -279,11 +340,17 @@ def draw_legend(
         handles.append(Line2D([], [], label=model, **style))
     if band:
         handles.append(Line2D([], [], lw=5.0, alpha=_BAND_OPACITY, color="0.3", label=band))
+    for style in point_styles:
+        handles.append(Line2D([], [], ls="none", **style))
     if not handles:
         return
-    longest = max(len(str(handle.get_label())) for handle in handles)
-    columns = int(_LETTERS_PER_INCH * figure.get_figwidth() / (longest + _LETTERS_OF_SYMBOL))
-    columns = max(1, min(len(handles), columns))
+    longest = 0
+    for handle in handles:
+        label = str(handle.get_label())
+        lines = wrap(label, max(_LETTERS_OF_SYMBOL, letters - _LETTERS_OF_SYMBOL)) or [label]
+        handle.set_label("\n".join(lines))
+        longest = max(longest, *map(len, lines))
+    columns = max(1, min(len(handles), int(letters / (longest + _LETTERS_OF_SYMBOL))))
     title = plain_text(colours.factor.name) if colours.factor is not None else None
     figure.legend(handles=handles, loc="outside lower center", title=title, ncols=columns)
 

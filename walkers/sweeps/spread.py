@@ -13,19 +13,23 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from walkers.arrays import FloatArray
 from walkers.errors import InputError, check_limits, input_error, key_error
-from walkers.files import write_json
+from walkers.files import read_json, write_json
 from walkers.inputs.axes import ranges_of, unit_cube, value_in_unit
 from walkers.inputs.messages import attributed_to
 from walkers.inputs.origins import Origin
 from walkers.inputs.sweep import SweepDefinition, expand
 from walkers.inputs.tables.case import Case
-from walkers.inputs.units import parse_quantity
+from walkers.inputs.units import parse_quantity, unit_factor, with_symbols
 from walkers.postprocess.measure.numbers import MAIN_NUMBERS
 from walkers.postprocess.measure.quantities import declared, unit_shown
 from walkers.postprocess.measure.sides import REST
 from walkers.postprocess.measure.uncertainty import (
     SPREAD_NAME,
+    SPREAD_TITLE,
     few_draws,
     fixed_values,
     fixed_values_text,
@@ -37,11 +41,12 @@ from walkers.rounding import counted, rounded
 from walkers.runner.binary import find_engine
 from walkers.runner.run_directory import run_place
 from walkers.runs.case_text import quantity_kind
+from walkers.runs.draws import Draws, Unknown
 from walkers.sweeps.correlations import rank_correlations
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.left_out import LeftOutWarning
 from walkers.sweeps.record import read_sweep_record
-from walkers.sweeps.scheduler import SweepOptions, run_sweep
+from walkers.sweeps.scheduler import SweepOptions, SweepPlan, plan_sweep, run_sweep
 from walkers.sweeps.table import main_columns, table_of, walking_points
 from walkers.sweeps.workers import Failure
 
@@ -122,9 +127,17 @@ class Spread:
         return contents
 
 
-def check_number_of_draws(points: int) -> None:
-    """Raise `InputError` if a number of draws is out of its limits, 2 to 4096."""
-    check_limits("points", points, 2, 4096)
+def check_number_of_draws(points: int, name: str = "points") -> None:
+    """Raise `InputError` if a number of draws is out of its limits, 2 to 4096.
+
+    Parameters
+    ----------
+    points
+        The number.
+    name
+        Name of the argument that gives it.
+    """
+    check_limits(name, points, 2, 4096, whole=True)
 
 
 def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) -> SweepDefinition:
@@ -165,7 +178,7 @@ def spread_sweep(case: Case, points: int = POINTS, engine: str | None = None) ->
         "ranges": ranges,
     }
     file = {
-        "title": f"{case.title or case.name}: uncertain values drawn from their ranges",
+        "title": f"{case.title or case.name}{SPREAD_TITLE}",
         "case": case.name,
         "sample": [sample],
     }
@@ -213,7 +226,6 @@ def _number_in_unit(value: Origin, unit: str | None) -> float:
 
 def _least_correlated_seed(values: int, points: int) -> int:
     """The seed for which the draws of the values are least correlated with each other."""
-    import numpy as np
 
     def largest_correlation(seed: int) -> float:
         cube = unit_cube(values, points, seed)
@@ -222,6 +234,26 @@ def _least_correlated_seed(values: int, points: int) -> int:
     if values == 1:
         return _SEEDS[0]
     return min(_SEEDS, key=largest_correlation)
+
+
+def plan_spread(
+    case: Case,
+    out: Path,
+    options: SweepOptions,
+    *,
+    points: int = POINTS,
+    engine: str | None = None,
+) -> SweepPlan:
+    """Plan the draws of the spread of a case; nothing is written.
+
+    The arguments and the errors are those of `run_spread`.
+    """
+    return plan_sweep(spread_sweep(case, points, engine), out, _options_of_draws(options), engine)
+
+
+def _options_of_draws(options: SweepOptions) -> SweepOptions:
+    """Options of a sweep for the draws of a spread."""
+    return replace(options, dumps=False, own_runs=True)
 
 
 def run_spread(  # noqa: PLR0913
@@ -245,7 +277,8 @@ def run_spread(  # noqa: PLR0913
     out
         Folder of the run directories.
     options
-        How the runs are made. They keep no dumps, which only pictures need.
+        How the runs are made. They keep no dumps, which only pictures need, and are made in the
+        directory of the spread.
     points
         Number of draws, see `spread_sweep`.
     engine, on_progress
@@ -268,9 +301,13 @@ def run_spread(  # noqa: PLR0913
     Values are drawn independently. Calibrated values are correlated
     (docs/explanation/calibration.md): for them, the band is wider than that of the posterior.
     """
-    options = replace(options, dumps=False)
-    draws = spread_sweep(case, points, engine)
-    record, failures = run_sweep(draws, out, options, engine=engine, on_progress=on_progress)
+    record, failures = run_sweep(
+        spread_sweep(case, points, engine),
+        out,
+        _options_of_draws(options),
+        engine=engine,
+        on_progress=on_progress,
+    )
     table = table_of(record)
     doubts = [result.warnings for result in table.results.values() if result.warnings]
     spread = spread_in(table.frame, case, record.directory, failures)
@@ -359,6 +396,61 @@ def _band_of(numbers: pd.Series) -> dict[str, float]:
     return band
 
 
+def draws_of(run: Path) -> Draws | None:
+    """The finished draws of the spread of a run.
+
+    None if the run has no spread, or its files cannot be read.
+
+    Parameters
+    ----------
+    run
+        The run directory.
+    """
+    import pandas as pd
+
+    directory = spread_of(run.resolve())
+    try:
+        varied = read_json(directory / SPREAD_NAME)["varied"]
+        unknowns = {value["key"]: _unknown_of(value) for value in varied}
+        frame = table_of(read_sweep_record(directory)).frame
+        finished = frame[frame["status"] == "finished"]
+        columns = [_in_si_units(finished, key) for key in unknowns]
+    except (InputError, OSError, ValueError, KeyError, TypeError):
+        return None  # as for the bands: there is no spread, or a file is damaged
+    walking = finished.index.isin(walking_points(finished).index)
+    numbers = {}
+    for name in MAIN_NUMBERS:
+        if name in finished:
+            column = pd.to_numeric(finished[name], errors="coerce").where(walking)
+            numbers[name] = column.to_numpy(dtype=float)
+    return Draws(unknowns, np.column_stack(columns), numbers)
+
+
+def _unknown_of(value: Mapping[str, Any]) -> Unknown:
+    """An uncertain value, from its entry in the file of a spread."""
+    kind = quantity_kind(value["key"])
+    ends = []
+    for end in value["range"]:
+        ends.append(parse_quantity(end, kind) if kind and isinstance(end, str) else float(end))
+    low, high = ends
+    return Unknown(
+        value=value["value"],
+        low=low,
+        high=high,
+        logarithmic=value["logarithmic"],
+        text=value["text"],
+        range_text=" to ".join(map(str, value["range"])),
+    )
+
+
+def _in_si_units(frame: pd.DataFrame, key: str) -> FloatArray:
+    """The drawn values of a key in SI units, shape (N,)."""
+    kind = quantity_kind(key)
+    unit = frame.attrs["units"][key]
+    factor = unit_factor(unit, kind.unit) if kind and unit else 1.0
+    return factor * frame[key].to_numpy(dtype=float)
+
+
 def figures_of_spread(run: Path) -> dict[str, Figure]:
     """The figure of the spread of a run, for its report, by the name ``spread``.
 
@@ -382,20 +474,20 @@ def spread_text(spread: Spread) -> str:
     points = 0
     for band in spread.bands.values():
         points = max(points, int(band["points"]))
-    lines = [
+    lines = wrapped_lines(
         f"  spread     {points} draws; values drawn independently from their ranges, "
         "half of them at or below the value of the case"
-    ]
+    )
     for value in spread.varied:
         ends = " to ".join(map(str, value.range or ()))
-        lines.append(f"{_INDENT}{value.key} {value.text} ({ends})")
+        lines.append(with_symbols(f"{_INDENT}{value.key} {value.text} ({ends})"))
     lines += wrapped_lines(f"    fixed    {fixed_values_text(spread.held)}")
     for name, band in spread.bands.items():
-        lines.append(f"    {declared(name).label:8} {_band_text(name, band)}")
-        lines.append(f"{_INDENT}{_dependence_text(spread, name)}")
+        lines += wrapped_lines(f"    {declared(name).label:8} {_band_text(name, band)}")
+        lines += wrapped_lines(f"{_INDENT}{_dependence_text(spread, name)}")
     outcomes = _outcomes_text(spread)
     if outcomes:
-        lines.append(f"    draws    {outcomes}")
+        lines += wrapped_lines(f"    draws    {outcomes}")
     if spread.doubts:
         draws = counted(len(spread.doubts), "draw")
         lines += wrapped_lines(f"    warning  {draws} with warnings, first: {spread.doubts[0][0]}")

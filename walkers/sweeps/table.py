@@ -43,12 +43,14 @@ from walkers.postprocess.measure.quantities import (
 )
 from walkers.postprocess.measure.results import Results, modules_of
 from walkers.postprocess.measure.sides import SEPARATED
+from walkers.postprocess.measure.tables import pandas_metadata
 from walkers.rounding import counted, rounded
 from walkers.runner.run_directory import case_of
 from walkers.runs.case_text import short_keys
 from walkers.runs.status import PointState, status_text
 from walkers.sweeps.record import SweepRecord, read_sweep_record, states
-from walkers.text import aligned, with_unit
+from walkers.terminal import HEADING, styled, wrapped
+from walkers.text import aligned_blocks, with_unit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -405,7 +407,7 @@ def encoded(frame: pd.DataFrame, form: str) -> bytes:
     """A sweep's table as the contents of a file, in one of `TABLE_FORMATS`.
 
     CSV has the units in its head, JSON has units and meanings beside the points, and parquet has
-    both in the metadata of its columns.
+    both in the metadata of its columns, and all ``attrs`` of the frame for pandas.
     """
     if form == "csv":
         return _csv_bytes(frame)
@@ -438,7 +440,9 @@ def _parquet_bytes(frame: pd.DataFrame) -> bytes:
     for column in table.schema:
         metadata = {"unit": units[column.name], "meaning": meanings[column.name]}
         fields.append(column.with_metadata(metadata))
-    schema = pa.schema(fields, metadata=table.schema.metadata)
+    file_metadata: dict[Any, Any] = dict(table.schema.metadata or {})
+    file_metadata |= pandas_metadata(frame.attrs)
+    schema = pa.schema(fields, metadata=file_metadata)
     buffer = io.BytesIO()
     pq.write_table(table.cast(schema), buffer, compression="zstd")
     return buffer.getvalue()
@@ -561,12 +565,22 @@ def _cell(value: Any, factor: float, unit: str) -> str:
     return rounded(value * factor, unit)
 
 
-def aligned_table(frame: pd.DataFrame) -> str:
-    """The `cells_of` a table, with a line below for the results that are the same at all points."""
+def aligned_table(frame: pd.DataFrame, width: int | None = None) -> str:
+    """The `cells_of` a table, with a line below for the results that are the same at all points.
+
+    A table that is wider than ``width`` is split; its parts begin with the varied keys.
+    """
     cells, same = cells_of(frame)
-    text = aligned([[*cells], *cells.to_numpy().tolist()], right=range(len(cells.columns)))
+    heads = [styled(str(head), HEADING) for head in cells]
+    keys = len(frame.attrs["varied"])
+    if "point" in frame:
+        keys += 1
+    text = aligned_blocks(
+        [heads, *cells.to_numpy().tolist()], width, repeated=keys, right=range(len(heads))
+    )
     if same:
-        text += f"\n\nthe same at all points: {same}"
+        same_lines = wrapped(f"the same at all points: {same}", width=width)
+        text += "\n\n" + "\n".join(same_lines)
     return text
 
 

@@ -7,7 +7,8 @@ from math import log
 from typing import Any
 
 from walkers.rounding import with_decimals
-from walkers.text import aligned
+from walkers.terminal import table_width
+from walkers.text import aligned_blocks, aligned_with_text
 
 _HEAD = ["mm/s", "velocity", "rotation 1", "rotation 2", "sliding 1", "Γc", ""]
 """Columns of the table of velocities."""
@@ -48,8 +49,8 @@ def prediction_text(prediction: Mapping[str, Any], result: Mapping[str, Any] | N
         ["alignment", _alignment_if_rolling_text(prediction["alignment"])],
         ["with slip", _alignment_if_slipping_text(prediction["alignment"])],
     ]
-    lines.append(aligned(rows, right=range(1, 6)))
-    lines.append(aligned(notes))
+    lines.append(aligned_blocks(rows, table_width(), right=range(1, 6)))
+    lines.append(aligned_with_text(notes, table_width()))
     return "\n".join(lines)
 
 

@@ -92,6 +92,10 @@ _SMALLEST_DISPLACEMENT = 1e-9
 """Smallest amplitude of an electrodynamic shaker, with a margin, m."""
 _LARGEST_DISPLACEMENT = 1.0
 """Largest amplitude of an electrodynamic shaker, with a margin, m."""
+_SLOWEST_SAMPLING = 20.0
+"""Smallest number of rows a second of a logger for shaking, which is at 40 Hz and more."""
+_FASTEST_SHAKING = 5e3
+"""Highest frequency of an electrodynamic shaker, Hz."""
 _POWERS_IN_TEXT = 6
 """Number of coefficients of each piece of a course, as the engine reads it."""
 
@@ -392,8 +396,8 @@ class Record(ConfigTable):
 
     @property
     def doubts(self) -> list[str]:
-        """Reasons why the offset of the sensor may act as a tilt, in words."""
-        doubts = []
+        """Reasons why the unit of the time may be wrong, or the offset act as a tilt, in words."""
+        doubts = self._doubts_about_time
         error = self.uncertain_offset
         if error > _TILT:
             periods = f"{self._periods_of_lines[0]} periods of its slowest line"
@@ -411,8 +415,8 @@ class Record(ConfigTable):
     def notes(self) -> list[str]:
         """What a user should know of a record before it is run, in words.
 
-        Notes are about columns that are left out, rows that are lost, an amplitude that no shaker
-        has, and the `doubts` about the offset.
+        Notes are about columns that are left out, rows that are lost, and the `doubts` about the
+        unit of the time and the offset.
         """
         notes = []
         if self.ignored_columns:
@@ -424,12 +428,24 @@ class Record(ConfigTable):
         if lost_rows:
             rows = counted(lost_rows, "row")
             notes.append(f"drive.record lacks {rows}: the spline goes over the gaps")
-        amplitude = self.largest(order=0)
-        if not _SMALLEST_DISPLACEMENT < amplitude < _LARGEST_DISPLACEMENT:
-            frequency = f"{self.frequencies[0]:.4g} Hz"
-            size = f"{frequency} and an amplitude of {amplitude:.2g} m"
-            notes.append(f"drive.record has {size}: is the unit of the time right?")
         return [*notes, *self.doubts]
+
+    @property
+    def _doubts_about_time(self) -> list[str]:
+        """A note on times whose unit is probably another one, in words; else none."""
+        amplitude = self.largest(order=0)
+        rate = (len(self.rows) - 1) / self.length
+        frequency = self.frequencies[0]
+        description = (
+            f"drive.record has {rate:.3g} rows a second, a frequency of {frequency:.4g} Hz "
+            f"and an amplitude of {amplitude:.3g} m"
+        )
+        question = "is the unit of the time right? It seems"
+        if amplitude > _LARGEST_DISPLACEMENT or rate < _SLOWEST_SAMPLING:
+            return [f"{description}: {question} that milliseconds are taken for seconds"]
+        if amplitude < _SMALLEST_DISPLACEMENT or frequency > _FASTEST_SHAKING:
+            return [f"{description}: {question} that seconds are taken for milliseconds"]
+        return []
 
 
 def course_text(times: FloatArray, powers: FloatArray, repeats: bool = False) -> str:

@@ -179,9 +179,9 @@ def _incomplete_tables(
         number = values[key].written
         message = f"missing; without the table, {key} is the number {number}: "
         message += whole_table_of(CaseFile, key)
-        problems += [
-            Problem(f"{key}.{part}", None, message) for part in _LAW if part not in written
-        ]
+        for part in _LAW:
+            if part not in written:
+                problems.append(Problem(f"{key}.{part}", None, message))
     return problems
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from itertools import combinations_with_replacement
-from math import inf, pi, sqrt
+from math import inf, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -183,42 +183,6 @@ def softness_warning(case: Setup) -> str | None:
         percentage = 100.0 * float(np.interp(delay, _MEASURED_DELAYS, _MEASURED_ERRORS))
         error = f"up to {percentage:.0f} % off those of hard beads (contact.youngs_modulus)"
     return f"{problem}; the speeds of climbing clusters are then {error}"
-
-
-def gravity_warnings(case: Setup) -> list[str]:
-    """Warnings about bridges of beads that are large or heavy.
-
-    The bridge laws leave out gravity. It deforms menisci as large as the capillary length
-    √(γ/ρg), which the bridges of larger beads can be. The liquid does not hold a bead that is
-    heavier than the capillary force of its bridge to a plane.
-
-    Returns
-    -------
-    list of str
-        Sentences; none for small beads, without liquid or without gravity.
-    """
-    gravity = case.environment.gravity
-    if gravity <= 0.0:
-        return []
-    radius = max(case.radii)
-    pull = bridge_at_rest(case, radius, inf).pull
-    if pull <= 0.0:  # without liquid
-        return []
-    warnings = []
-    beads = f"beads of R = {1e3 * radius:.3g} mm"
-    liquid = case.liquid
-    if liquid.density:
-        length = sqrt(liquid.surface_tension / (liquid.density * gravity))
-        if radius > length:
-            warnings.append(
-                f"{beads} exceed the capillary length of the liquid, {1e3 * length:.2g} mm: "
-                "gravity deforms their menisci, which the bridge laws leave out"
-            )
-    weight = bead_volume(radius) * case.beads.density * gravity
-    if weight > pull:
-        times = f"{weight / pull:.2g} times the pull of their bridge to a plane"
-        warnings.append(f"{beads} weigh {times}: the liquid does not hold them")
-    return warnings
 
 
 def largest_delay(case: Setup) -> float:

@@ -105,6 +105,17 @@ class Boundary(ConfigTable):
             elif name in given and name not in sizes:
                 yield Problem(key_within(place, name), None, f"expected none for a {shape}")
 
+    @classmethod
+    def replaced_by(cls, name: str, value: object) -> set[str]:
+        """The keys that describe another boundary than a new shape, mesh or list of planes."""
+        if name == "mesh":
+            return {"shape", "planes", *_SIZES}
+        if name == "planes":
+            return {"shape", "mesh", "scale", "opening", "width"}
+        if name == "shape" and value in SHAPES and value != "vessel":
+            return {*_VESSEL_KEYS, *_SIZES}.difference(SHAPES[str(value)].sizes)
+        return set()
+
     @property
     def geometry(self) -> Shape:
         """The shape with its sizes, which answers what depends on the form of the boundary."""

@@ -23,7 +23,7 @@ from walkers.errors import Problem, key_error
 from walkers.inputs import units
 from walkers.inputs.config_table import Choice, ConfigTable, Indirect, key
 from walkers.inputs.records.record import FEWEST_PERIODS, Record, course_text, record_of
-from walkers.inputs.units import Angle, Coefficient
+from walkers.inputs.units import ACCELERATION_OF_ONE_G, Angle, Coefficient
 
 if TYPE_CHECKING:
     from scipy.interpolate import PPoly
@@ -542,9 +542,15 @@ class Excitation:
             files["ramp.txt"] = course_text(self.factor.x, self.factor.c)
         return files
 
-    def described(self) -> str:
-        """The drive in a few words: ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``."""
-        text = self._described_record(self.record) if self.record else self._described_harmonics()
+    def described(self, *, in_g: bool = False) -> str:
+        """The drive in a few words: ``80 Hz, a0 = 39.2 m/s² + 160 Hz, a0 = 29.4 m/s², 90°``.
+
+        Accelerations are in m/s², or in units of 9.8 m/s² as ``a0 = 4 g``.
+        """
+        if self.record:
+            text = self._described_record(self.record)
+        else:
+            text = self._described_harmonics(in_g=in_g)
         if self.ramp:
             text += ", ramp " + " to ".join(f"{factor:g}" for _, factor in self.ramp)
         return text
@@ -562,17 +568,21 @@ class Excitation:
             text += f" (its line: {line_amplitude:.4g} m/s²)"
         return text
 
-    def _described_harmonics(self) -> str:
+    def _described_harmonics(self, *, in_g: bool) -> str:
         """All harmonics if there are at most three, else the largest and the number of others."""
         if len(self.harmonics) <= _DESCRIBED_HARMONICS:
-            return " + ".join(_described_harmonic(harmonic) for harmonic in self.harmonics)
-        largest = _described_harmonic(self.largest)
+            texts = [_described_harmonic(harmonic, in_g=in_g) for harmonic in self.harmonics]
+            return " + ".join(texts)
+        largest = _described_harmonic(self.largest, in_g=in_g)
         return f"{largest} + {len(self.harmonics) - 1} harmonics up to {self.fastest:g} Hz"
 
 
-def _described_harmonic(harmonic: Harmonic) -> str:
+def _described_harmonic(harmonic: Harmonic, *, in_g: bool) -> str:
     """Frequency and peak acceleration of a harmonic, and its phase if it has one."""
-    text = f"{harmonic.frequency:g} Hz, a0 = {harmonic.peak_acceleration:.4g} m/s²"
+    acceleration = f"{harmonic.peak_acceleration:.4g} m/s²"
+    if in_g:
+        acceleration = f"{harmonic.peak_acceleration / ACCELERATION_OF_ONE_G:.4g} g"
+    text = f"{harmonic.frequency:g} Hz, a0 = {acceleration}"
     if harmonic.phase:
         text += f", {degrees(harmonic.phase):g}°"
     return text

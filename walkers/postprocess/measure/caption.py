@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import degrees
 
+from walkers.inputs.origins import accelerations_in_g
 from walkers.inputs.tables.case import Case
 from walkers.rounding import counted
 
@@ -31,13 +32,16 @@ def caption(case: Case) -> str:
     return f"{', '.join(bodies)} {place}, {liquid_text(case)}; {conditions(case)}"
 
 
-def conditions(case: Case) -> str:
+def conditions(case: Case, *, in_given_unit: bool = False) -> str:
     """Describe the drive of a case and, unless it is level, its tilt and where up is.
 
+    Accelerations are in m/s², or in g if the case gives them so and ``in_given_unit`` is true.
     An example is ``…, plane tilted by 90°, right is up``. Pictures have the drive axis to the
     right: what faces right goes up where that is the steepest way up.
     """
-    drive: str = case.excitation.described()
+    texts = {origin.key: origin.text for origin in case.origins}
+    in_g = in_given_unit and accelerations_in_g(texts)
+    drive: str = case.excitation.described(in_g=in_g)
     tilt = case.boundary.tilted
     if not tilt:
         return drive

@@ -74,6 +74,24 @@ class Motion:
         frame, None if it was not recorded.
     bead_numbers : ndarray of int, shape (N,), or None
         Indices of the beads in the run; None if the motion has all beads of the run.
+    directory : Path
+        The run directory.
+    first_driven : int
+        Index of the first frame of the drive.
+    driven : Motion
+        The motion during the drive.
+    averaged : Motion
+        Means over the F - 1 intervals between frames.
+    follows_cycles : bool
+        Whether there are enough frames a cycle to resolve it.
+    large : ndarray of bool, shape (N,)
+        Whether a bead is of the large class.
+    walker_of : ndarray of int, shape (N,)
+        Index of the walker of each bead, −1 for none.
+    bridges : list of Bridges
+        The bridges of each frame that recorded them: pairs of beads, walls and gaps.
+    groups : list of Group
+        The walkers of each kind during the drive, with headings, orientations and gaps.
     """
 
     case: Case
@@ -196,7 +214,10 @@ class Motion:
 
     @property
     def large(self) -> BoolArray:
-        """Whether a bead is of the large class, shape (N,)."""
+        """Whether a bead is of the large class, shape (N,).
+
+        The class begins above `walkers.inputs.tables.case.Setup.border`.
+        """
         return self.radius > self.case.border
 
     @cached_property

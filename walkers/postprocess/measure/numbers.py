@@ -218,6 +218,32 @@ def rows(numbers: Mapping[str, Any]) -> list[Row]:
     return listed
 
 
+def important_rows(numbers: Mapping[str, Any]) -> list[Row]:
+    """The most important of the `rows` of a result, without the main number that is said above.
+
+    Parameters
+    ----------
+    numbers
+        The numbers of a result in SI units, NaN where undefined.
+    """
+    names = SHOWN["important"]
+    if numbers.get("facings_differ"):
+        names |= {"right_facing", "left_facing"}
+    if not_all_upright(numbers):
+        names |= {"axial_velocity", "axial_left_facing"}
+    if state(numbers):
+        names |= {headline(numbers)}
+    return [row for row in rows(numbers) if _matches_any(row.name, names)]
+
+
+def main_errors(numbers: Mapping[str, Any]) -> str:
+    """The band and the numerical error of the main number of a result; empty if it has neither."""
+    main = headline(numbers)
+    if not main:
+        return ""
+    return ", ".join(_computed_errors(numbers, declared(main)))
+
+
 def _hidden_numbers(numbers: Mapping[str, Any]) -> set[str]:
     """Names of the numbers of a result that have no row."""
     main = headline(numbers)
@@ -316,13 +342,20 @@ def _errors(numbers: Mapping[str, Any], quantity: Quantity) -> str:
     if isfinite(scatter):
         word = "resolution" if quantity.error.endswith("_within") else "scatter of copies"
         parts.append(f"{word} {error_text(scatter, quantity.unit)}")
+    parts += _computed_errors(numbers, quantity)
+    return ", ".join(parts)
+
+
+def _computed_errors(numbers: Mapping[str, Any], quantity: Quantity) -> list[str]:
+    """The band and the numerical error of a number in its displayed unit, with words."""
+    parts = []
     band = band_of(numbers, quantity)
     if band:
         parts.append(band)
     error = numbers.get(f"{quantity.name}_error", nan)
     if isfinite(error):
         parts.append(f"numerical error {error_text(error, quantity.unit)}")
-    return ", ".join(parts)
+    return parts
 
 
 def error_text(error: float, unit: str) -> str:

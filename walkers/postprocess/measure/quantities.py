@@ -107,7 +107,8 @@ SHOWN: Mapping[str, frozenset[str]] = {
 
 ``walkers.postprocess.measure.numbers.rows`` never shows those of ``aside`` and ``hidden``, those of
 ``not_of_a_ramp`` under a ramp, those of ``not_of_parts`` if walkers came apart, and those of
-``if_any`` if they are zero. On a slope, those of ``facing_up`` leave out walkers that face down."""
+``if_any`` if they are zero. Short texts have only those of ``important``. On a slope, those of
+``facing_up`` leave out walkers that face down."""
 LABELS: Mapping[str, Mapping[str, str]] = _FILE["labels"]
 """Labels of numbers of walkers that face up or down: on a ``level`` boundary, on a ``slope``, and
 of ``both`` directions."""

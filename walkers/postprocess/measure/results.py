@@ -18,12 +18,23 @@ from typing import TYPE_CHECKING, Any
 from walkers.errors import InputError, input_error
 from walkers.files import read_json, write_json
 from walkers.inputs.resolving.length import limits_of
-from walkers.inputs.resolving.loads import gravity_warnings, softness_warning
+from walkers.inputs.resolving.loads import softness_warning
+from walkers.inputs.resolving.plausibility import implausible
 from walkers.postprocess.measure import meetings, piles, record_part, threshold, walking
 from walkers.postprocess.measure.caption import conditions
+from walkers.postprocess.measure.in_words import motion_in_words
 from walkers.postprocess.measure.measuring_module import MeasuringModule
 from walkers.postprocess.measure.motion import Motion, read_motion
-from walkers.postprocess.measure.numbers import MAIN_NUMBERS, Row, headline, rows, state
+from walkers.postprocess.measure.numbers import (
+    MAIN_NUMBERS,
+    Row,
+    headline,
+    important_rows,
+    main_errors,
+    rows,
+    short_text,
+    state,
+)
 from walkers.postprocess.measure.tables import Columns, read_columns, read_table, write_table
 from walkers.postprocess.measure.uncertainty import (
     accuracy_of,
@@ -40,6 +51,7 @@ from walkers.runner.run_directory import (
     recomputed,
     segment_directories,
 )
+from walkers.terminal import ASIDE, HEADING, WARNING, styled, text_width, wrapped, wrapped_after
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -59,6 +71,10 @@ _BEFORE_MODULES = 2
 """Version of all modules in results that do not contain versions of modules."""
 _ENTRIES = ("case", "drive", "rests_on", "by_hand", "tables", "warnings")
 """Entries of ``result.json`` other than the numbers."""
+_INDENT = "    "
+"""Start of the further lines of a text for a terminal."""
+_HEAD_WIDTH = 13
+"""Width of the head beside which wrapped lines stand, characters."""
 _DRIVE_NUMBERS = ("frequency", "peak_acceleration", "peak_velocity", "amplitude")
 """Numbers of all results that follow from the drive."""
 
@@ -198,7 +214,7 @@ def _general_warnings(motion: Motion) -> list[str]:
     softness = softness_warning(case)
     if softness is not None:
         warnings.append(softness)
-    warnings += gravity_warnings(case)
+    warnings += implausible(case)
     if motion.truncated:
         warnings.append("the dump ends within a frame")
     return warnings
@@ -352,8 +368,8 @@ def _json_number(number: Any) -> Any:
     return python_number
 
 
-def text(results: Results, *, cached: bool = False) -> str:
-    """Write a result as lines for a terminal.
+def text(results: Results, *, cached: bool = False, verbose: bool = False) -> str:
+    """Write a result as lines for a terminal, the most important first.
 
     Parameters
     ----------
@@ -361,32 +377,60 @@ def text(results: Results, *, cached: bool = False) -> str:
         The result.
     cached
         Whether the run had been made before, which the first line then says.
+    verbose
+        Whether to write all numbers, and all values that have not been measured.
 
     Returns
     -------
     str
-        State or drive, uncertainties that are not computed, numbers, warnings, origins of uncertain
-        values, and the directory.
+        The main number with its band and numerical error, or that these are not computed; what the
+        beads do; warnings; the drive; the most important numbers; guessed values; the directory.
     """
-    first, *rest = headlines(results)
-    if cached and not results.about["by_hand"]:  # it was never made by a command
-        first += " (already run)"
-    lines = [first]
-    lines += [f"  {line}" for line in rest]
+    lines = _main_lines(results, cached=cached)
     missing = not_computed(results)
     if missing:
-        lines.append(f"  uncertainty not computed: {missing.text}")
-    lines += _lines_of_numbers(rows(results))
-    lines += [f"  warning: {warning}" for warning in results.warnings]
-    lines += uncertain_value_lines(results.about["rests_on"])
+        lines += wrapped(f"  uncertainty not computed: {missing.text}", _INDENT)
+    motion = motion_in_words(results)
+    if motion:
+        lines += wrapped(f"  {motion}", "  ")
+    for warning in results.warnings:
+        lines += wrapped_after("  warning:", f" {warning}", WARNING, _INDENT)
+    lines += wrapped(f"  drive      {drive_text(results)}", " " * _HEAD_WIDTH)
+    lines += _lines_of_numbers(rows(results) if verbose else important_rows(results))
+    values = results.about["rests_on"]
+    if not verbose:
+        values = [value for value in values if value["guessed"]]
+    lines += uncertain_value_lines(values, text_width())
     if has_band(results):
-        lines.append(f"  band       {BAND_NOTE}")
+        lines += wrapped(f"  band       {BAND_NOTE}", " " * _HEAD_WIDTH)
     lines.append(f"  run        {results.directory}")
+    if not verbose:
+        lines.append(styled("             all numbers: -v, or walkers report", ASIDE))
     return "\n".join(lines)
 
 
+def _main_lines(results: Results, *, cached: bool) -> list[str]:
+    """The case with its main number or state and the errors, in the style of a heading."""
+    heading = short_text(results)
+    if heading == "-":  # neither walkers nor a pile
+        heading = counted(results.get("beads", 0), "bead")
+    if headline(results) == "velocity" and not state(results):
+        heading = f"velocity {heading}"
+    parts = [heading]
+    errors = main_errors(results)
+    if errors:
+        parts.append(errors)
+    line = f"{results.about['case']}: {', '.join(parts)}"
+    if cached and not results.about["by_hand"]:  # it was never made by a command
+        line += " (already run)"
+    return [styled(part, HEADING) for part in wrapped(line, _INDENT)]
+
+
 def _lines_of_numbers(listed: Sequence[Row]) -> list[str]:
-    """Numbers as lines with aligned labels, values, units and errors."""
+    """Numbers as lines with aligned labels, values, units and errors.
+
+    Errors that do not fit into the line stand in the next one.
+    """
     label_width = 0
     value_width = 0
     unit_width = 0
@@ -397,7 +441,12 @@ def _lines_of_numbers(listed: Sequence[Row]) -> list[str]:
     lines = []
     for row in listed:
         value = f"{row.text:>{value_width}} {row.unit:{unit_width}}"
-        lines.append(f"  {row.label:{label_width}}  {value}  {row.error}".rstrip())
+        line = f"  {row.label:{label_width}}  {value}"
+        if len(line) + 2 + len(row.error) <= text_width():
+            lines.append(f"{line}  {row.error}".rstrip())
+            continue
+        lines.append(line.rstrip())
+        lines += wrapped(f"{_INDENT}  {row.error}", f"{_INDENT}  ")
     return lines
 
 
@@ -457,12 +506,21 @@ def has_band(results: Mapping[str, Any]) -> bool:
 def headlines(results: Results) -> list[str]:
     """The case, its drive, and the state of its walkers."""
     case = results.about["case"]
-    drive = results.about["drive"]
-    gamma0 = results.get("gamma0", nan)
-    sin_delta = results.get("sin_delta", nan)
-    if isfinite(gamma0) and isfinite(sin_delta):
-        drive += f", Γ0 = {gamma0:.3g}, sin δ = {sin_delta:.3g}"
+    drive = drive_text(results)
     state_of_walkers = state(results)
     if state_of_walkers:
         return [f"{case}: {state_of_walkers}", drive]
     return [f"{case}: {drive}"]
+
+
+def drive_text(results: Results) -> str:
+    """The drive of a result as its case gives it, with Γ0 and sin δ of dimers."""
+    try:
+        drive = conditions(case_of(results.directory), in_given_unit=True)
+    except (OSError, ValueError, KeyError, TypeError):  # the case cannot be read
+        drive = results.about["drive"]
+    gamma0 = results.get("gamma0", nan)
+    sin_delta = results.get("sin_delta", nan)
+    if isfinite(gamma0) and isfinite(sin_delta):
+        drive += f", Γ0 = {gamma0:.3g}, sin δ = {sin_delta:.3g}"
+    return drive

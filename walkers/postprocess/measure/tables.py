@@ -1,11 +1,13 @@
 """The tables of a run: parquet files whose columns have units, labels and meanings.
 
-They are written with pyarrow alone, because pandas takes a third of a second to import.
+They are written with pyarrow alone, because pandas takes a third of a second to import. A frame
+that ``pandas.read_parquet`` reads has units and labels in its ``attrs``, as one of `read_table`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -19,6 +21,8 @@ from walkers.postprocess.measure.quantities import TABLES, declared, matches
 if TYPE_CHECKING:
     import pandas as pd
 
+_ATTRIBUTES = ("units", "long_name")
+"""What the ``attrs`` of a table have by column; names of the CF conventions."""
 Columns: TypeAlias = dict[str, npt.NDArray[Any]]
 """Columns of a table by their names, all of one length."""
 
@@ -76,9 +80,10 @@ def write_table(directory: Path, name: str, columns: Columns) -> None:
             reals.append(column)
         else:
             not_reals.append(column)
+    attributes = _attributes(fields)
     with replacing(directory / f"{name}.parquet") as new:
         pq.write_table(
-            pa.Table.from_arrays(arrays, schema=pa.schema(fields)),
+            pa.Table.from_arrays(arrays, schema=pa.schema(fields, pandas_metadata(attributes))),
             new,
             compression="zstd",
             use_dictionary=not_reals,
@@ -112,6 +117,29 @@ def _metadata(table: str, column: str) -> dict[str, str]:
         "units": quantity.si_unit,
         "long_name": quantity.label,
     }
+
+
+def _attributes(fields: Iterable[Any]) -> dict[str, dict[str, str]]:
+    """Units and labels of columns, which are the ``attrs`` of a data frame."""
+    attributes: dict[str, dict[str, str]] = {}
+    for name in _ATTRIBUTES:
+        attributes[name] = {}
+        for field in fields:
+            attributes[name][field.name] = field.metadata[name.encode()].decode()
+    return attributes
+
+
+def pandas_metadata(attributes: Mapping[Any, Any]) -> dict[bytes, bytes]:
+    """Metadata of a parquet file that ``pandas.read_parquet`` makes the ``attrs`` of its frame.
+
+    This is how pandas itself stores them, from version 2.1 on. Other readers ignore it.
+
+    Parameters
+    ----------
+    attributes
+        What ``attrs`` has, of JSON's types.
+    """
+    return {b"PANDAS_ATTRS": json.dumps(attributes, ensure_ascii=False).encode()}
 
 
 def _arrow(values: npt.NDArray[Any]) -> Any:
@@ -152,10 +180,7 @@ def read_table(directory: str | Path, name: str) -> pd.DataFrame:
     """
     table = _read(Path(directory), name)
     frame: pd.DataFrame = table.to_pandas()
-    for attribute in ("units", "long_name"):
-        frame.attrs[attribute] = {
-            field.name: field.metadata[attribute.encode()].decode() for field in table.schema
-        }
+    frame.attrs |= _attributes(table.schema)
     return frame
 
 

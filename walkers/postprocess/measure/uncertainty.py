@@ -10,7 +10,6 @@ in a run directory. It runs nothing.
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Collection, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
@@ -21,22 +20,30 @@ from walkers.files import read_json
 from walkers.inputs.origins import Origin
 from walkers.inputs.resolving.from_library import OF_LIQUIDS
 from walkers.inputs.resolving.library import unmeasured
+from walkers.inputs.units import with_symbols
 from walkers.runner.manifest import check_unchanged
+from walkers.terminal import wrapped
 
 SPREAD = "-spread"
 """End of the name of the directory of a spread (`spread_of`)."""
+SPREAD_TITLE = ": uncertain values drawn from their ranges"
+"""End of the title of a spread, after the condition of its run."""
 SPREAD_NAME = "spread.json"
 """Name of the file with the bands in the directory of a spread."""
 ACCURACY = "-accuracy"
 """End of the name of the sweep that measures numerical errors."""
+ACCURACY_TITLE = ": smaller time steps and harder beads"
+"""End of the title of the sweep that measures numerical errors, after the condition of its run."""
 ACCURACY_NAME = "accuracy.json"
 """Name of the file with the numerical errors in a run directory."""
 LEAST_PER_VALUE = 3
 """Least number of draws per varied value (`few_draws`)."""
+OF_OTHERS = "not of these materials and this liquid"
+"""What guessed values are."""
 _LEAST = 6
 """Least number of draws: of five, no rank correlation is larger than two standard errors, 2/√4."""
-_TERMINAL_WIDTH = 110
-"""Width of lines for a terminal, characters."""
+_PAGE_WIDTH = 110
+"""Width of lines in reports, characters."""
 _HEAD_WIDTH = 13
 """Width of the head beside which wrapped lines stand, characters."""
 _HEADS = ("guessed", "uncertain", "given", "calibrated", "assumed", "library", "own library")
@@ -82,13 +89,17 @@ def uncertain_values(origins: Sequence[Origin]) -> list[dict[str, Any]]:
     return values
 
 
-def uncertain_value_lines(values: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Write uncertain values as lines for a terminal, by their origin.
+def uncertain_value_lines(
+    values: Sequence[Mapping[str, Any]], width: int = _PAGE_WIDTH
+) -> list[str]:
+    """Write uncertain values as lines, by their origin.
 
     Parameters
     ----------
     values
         Values of `uncertain_values`.
+    width
+        Width of the lines, characters; default: that of lines in reports.
 
     Returns
     -------
@@ -99,11 +110,11 @@ def uncertain_value_lines(values: Sequence[Mapping[str, Any]]) -> list[str]:
     for value in values:
         values_by_head.setdefault(_head_of(value), []).append(_value_text(value))
     if "guessed" in values_by_head:
-        values_by_head["guessed"][-1] += " (not of these materials and this liquid)"
+        values_by_head["guessed"][-1] += f" ({OF_OTHERS})"
     lines: list[str] = []
     for head in _HEADS:
         if head in values_by_head:
-            lines += wrapped_lines(f"  {head:10} {', '.join(values_by_head[head])}")
+            lines += wrapped_lines(f"  {head:10} {', '.join(values_by_head[head])}", width)
     return lines
 
 
@@ -117,7 +128,7 @@ def _head_of(value: Mapping[str, Any]) -> str:
 def _value_text(value: Mapping[str, Any]) -> str:
     """An uncertain value with its key in its table: ``bead_wall 0.25``."""
     _, _, key_in_table = value["key"].partition(".")
-    return f"{key_in_table} {value['value']}"
+    return f"{key_in_table} {with_symbols(str(value['value']))}"
 
 
 def guesses(values: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -132,10 +143,12 @@ def guesses(values: Sequence[Mapping[str, Any]]) -> list[str]:
     return [_value_text(value) for value in guessed]
 
 
-def wrapped_lines(text: str) -> list[str]:
-    """Wrap a text for a terminal; its further lines stand beside its head of 13 characters."""
-    indent = " " * _HEAD_WIDTH
-    return textwrap.wrap(text, _TERMINAL_WIDTH, subsequent_indent=indent, break_on_hyphens=False)
+def wrapped_lines(text: str, width: int | None = None) -> list[str]:
+    """Wrap a text; its further lines stand beside its head of 13 characters.
+
+    Lines have the width of the terminal unless a ``width`` is given.
+    """
+    return wrapped(text, " " * _HEAD_WIDTH, width)
 
 
 def fixed_values(origins: Sequence[Origin]) -> tuple[Origin, ...]:
@@ -181,7 +194,8 @@ def fixed_values_text(values: Sequence[Origin]) -> str:
 
 def _key_and_value(values: Sequence[Origin], keys: Collection[str]) -> str:
     """The values that have some keys, as text."""
-    return ", ".join(f"{value.key} {value.text}" for value in values if value.key in keys)
+    listed = [f"{value.key} {value.text}" for value in values if value.key in keys]
+    return with_symbols(", ".join(listed))
 
 
 def few_draws(draws: int, values: int) -> bool:

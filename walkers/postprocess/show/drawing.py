@@ -131,12 +131,15 @@ def check_formats(formats: str | Sequence[str]) -> list[str]:
     Raises `InputError` for a format that is not in `FORMATS`.
     """
     texts = [formats] if isinstance(formats, str) else formats
+    expected = f"expected one of {', '.join(FORMATS)}"
+    if not isinstance(texts, Sequence):
+        raise input_error("formats", f"{texts!r}: {expected}, or several in a list")
     names: list[str] = []
     for text in texts:
-        names += text.split(",")
+        names += str(text).split(",")
     for name in names:
         if name not in FORMATS:
-            raise input_error("format", f"{name!r}: expected one of {', '.join(FORMATS)}")
+            raise input_error("formats", f"{name!r}: {expected}")
     return list(dict.fromkeys(names))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -93,6 +94,12 @@ class FilmOptions:
 
     def __post_init__(self) -> None:
         """Check what does not depend on a run."""
-        check_limits("size", min(self.size), _LEAST_SIZE)
+        if not isinstance(self.size, Sequence) or len(self.size) != 2:
+            raise input_error("size", f"{self.size!r}: expected width and height, in pixels")
+        for pixels in self.size:
+            check_limits("size", pixels, _LEAST_SIZE, whole=True)
         check_limits("fps", self.fps, 1, 60)
         check_limits("slowdown", self.slowdown, 0.05, 1e4)
+        check_limits("walker", self.walker, whole=True)
+        check_limits("begin", self.begin)
+        check_limits("end", self.end)

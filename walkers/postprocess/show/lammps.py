@@ -54,7 +54,7 @@ def write_trajectory(
     """
     path = destination or directory / f"trajectory{SUFFIX}"
     check_place(path, SUFFIX)
-    check_limits("every", every, 1)
+    check_limits("every", every, 1, whole=True)
     motion = read_motion(directory).driven.select(slice(None, None, every))
     count = len(motion.radius)
     low, high = _box(motion)

@@ -81,7 +81,7 @@ def write_vtk(
         Unless the destination is new, empty, or has no files but those that its ``walkers.pvd``
         lists; also if it is a symbolic link.
     """
-    check_limits("every", every, 1)
+    check_limits("every", every, 1, whole=True)
     destination = destination or directory / "vtk"
     earlier_files = _earlier_files(destination)
     motion = read_motion(directory)

@@ -118,7 +118,8 @@ def render_series(
         If the destination is no PNG, ``images`` is out of its range, or the run has no walker with
         this number.
     """
-    check_limits("images", images, 1, 20)
+    check_limits("images", images, 1, 20, whole=True)
+    check_limits("walker", walker, whole=True)
     if destination is not None:
         check_place(destination, ".png")
     motion, is_single = motion_in_view(read_motion(directory), walker)

@@ -17,7 +17,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from walkers.errors import input_error
+from walkers.files import make_folder
 from walkers.postprocess.show.drawing import check_place, styled
 from walkers.runner.provenance import PROJECT, software
 from walkers.text import environment
@@ -34,11 +34,9 @@ _PACKAGE = "walkers.postprocess.show.report"
 
 
 def check_report(path: Path) -> None:
-    """Raise `InputError` unless a path is an .html file in an existing folder."""
+    """Raise `InputError` unless a path is an .html file; make its folder if it does not exist."""
     check_place(path, ".html", ".htm")
-    folder = path.absolute().parent
-    if not folder.is_dir():
-        raise input_error(folder, "there is no such folder")
+    make_folder(path.absolute().parent)
 
 
 def page_of(title: str, body: str, players: Mapping[str, str] | None = None) -> str:

@@ -75,7 +75,7 @@ def report_run(
     Raises
     ------
     InputError
-        If the file is no HTML file in an existing folder.
+        If the file is no HTML file, or its folder cannot be made.
     walkers.postprocess.measure.dump.DumpError
         If a dump cannot be read.
     """
