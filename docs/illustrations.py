@@ -152,17 +152,18 @@ def _picture(
     return Illustration((file,), cases, make)
 
 
-def _film(file: str, name: str, changes: Changes) -> Illustration:
-    """A film of the first walker of a run."""
+def _films(gif: str, mp4: str, name: str, changes: Changes) -> Illustration:
+    """Films of the first walker of a run: a small one for GitHub, and one for the start page."""
 
     def cases() -> list[Case]:
         return [load_case(name, changes)]
 
     def make(out: Path, docs: Path) -> None:
         walk = run(load_case(name, changes), out)
-        walk.film(docs / file, size=(512, 216), fps=20, slowdown=20.0, walker=0, end=0.4)
+        walk.film(docs / gif, size=(512, 216), fps=20, slowdown=20.0, walker=0, end=0.4)
+        walk.film(docs / mp4, size=(960, 400), fps=25, slowdown=20.0, walker=0, end=0.4)
 
-    return Illustration((file,), cases, make)
+    return Illustration((gif, mp4), cases, make)
 
 
 # --- figures of the paper -------------------------------------------------------------------------
@@ -566,7 +567,7 @@ def _calibration() -> Illustration:
 
 ILLUSTRATIONS: dict[str, Illustration] = {
     "walker": _picture("pictures/walker.png", "fig1b", _SHORT_WALK),
-    "film": _film("pictures/walker.gif", "fig1b", _SHORT_WALK),
+    "film": _films("pictures/walker.gif", "_static/walker.mp4", "fig1b", _SHORT_WALK),
     "tray": _picture("pictures/tray.png", "tray"),
     # Walker 3 starts 9.7° off the vertical, furthest of all six.
     "climber": _picture("pictures/climber.png", "climber", walker=3),
