@@ -20,8 +20,8 @@ warnings.simplefilter("ignore", UnauditedEngineWarning)
 
 project = "granular-walkers"
 author = "the authors of granular-walkers"
-project_copyright = author
 version = release = metadata.version("granular-walkers")
+project_copyright = f"{author}. Version {version.split('+')[0]}, BSD-3-Clause"
 
 extensions = [
     "numpydoc",
@@ -48,7 +48,7 @@ myst_links_external_new_tab = False
 # Nothing comes from the network: formulas become MathML, which browsers draw by themselves.
 html_math_renderer = "mathml"
 html_theme = "pydata_sphinx_theme"
-html_title = f"granular-walkers {version}"
+html_title = "granular-walkers"
 html_context = {"default_mode": "auto"}
 html_static_path = ["_static"]
 html_css_files = ["walkers.css"]
