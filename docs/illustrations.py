@@ -28,7 +28,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from docs import tables, why_it_walks
+from docs import notation, tables, why_it_walks
 from studies import effects, frictions, frictions_by_engine
 from studies.friction_laws import LAWS, calibration_with
 from studies.literature import experiments
@@ -384,6 +384,19 @@ def _why_it_walks() -> Illustration:
     return Illustration((figure, str(_NUMBERS_OF_A_CYCLE)), cases, make)
 
 
+def _notation() -> Illustration:
+    """The drawing of the page *Notation*, which shows no run."""
+    file = "figures/notation.png"
+
+    def cases() -> list[Case]:
+        return []
+
+    def make(_out: Path, docs: Path) -> None:
+        save_figure(notation.figure(), docs / file, (), title="Notation")
+
+    return Illustration((file,), cases, make)
+
+
 def _frictions() -> Illustration:
     """The table of `studies.frictions`, which takes half an hour."""
     file = "figures/frictions.md"
@@ -584,6 +597,7 @@ for _shown in _SWEEP_FIGURES:
 ILLUSTRATIONS["pile-climbs"] = _climbs()
 ILLUSTRATIONS["unexplained"] = _effects()
 ILLUSTRATIONS["why-it-walks"] = _why_it_walks()
+ILLUSTRATIONS["notation"] = _notation()
 ILLUSTRATIONS["frictions"] = _frictions()
 ILLUSTRATIONS["frictions-by-engine"] = _frictions_by_engine()
 ILLUSTRATIONS["validation"] = _validation()
