@@ -752,6 +752,9 @@ def _of_comparison(compared: Mapping[str, Any]) -> dict[str, str]:
     for row in compared["curve"]:
         if row["of"] == "Fig. 2, 5 g":
             numbers["by_frequency_5g"] = f"{row['by_frequency']:.2f}"
+        name = "_".join(re.findall(r"\w+", row["of"].lower()))
+        numbers[f"{name}_engine"] = f"{row['engine']:.3g}"
+        numbers[f"{name}_paper"] = f"{row['curve']:.3g}"
     return numbers
 
 
