@@ -28,7 +28,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from docs import tables, why_it_walks
+from docs import notation, tables, why_it_walks
 from studies import effects, frictions, frictions_by_engine
 from studies.friction_laws import LAWS, calibration_with
 from studies.literature import experiments
@@ -385,6 +385,19 @@ def _why_it_walks() -> Illustration:
     return Illustration((figure, str(_NUMBERS_OF_A_CYCLE)), cases, make)
 
 
+def _notation() -> Illustration:
+    """The drawing of the page *Notation*, which shows no run."""
+    file = "figures/notation.png"
+
+    def cases() -> list[Case]:
+        return []
+
+    def make(_out: Path, docs: Path) -> None:
+        save_figure(notation.figure(), docs / file, (), title="Notation")
+
+    return Illustration((file,), cases, make)
+
+
 def _frictions() -> Illustration:
     """The table of `studies.frictions`, which takes half an hour."""
     file = "figures/frictions.md"
@@ -585,6 +598,7 @@ for _shown in _SWEEP_FIGURES:
 ILLUSTRATIONS["pile-climbs"] = _climbs()
 ILLUSTRATIONS["unexplained"] = _effects()
 ILLUSTRATIONS["why-it-walks"] = _why_it_walks()
+ILLUSTRATIONS["notation"] = _notation()
 ILLUSTRATIONS["frictions"] = _frictions()
 ILLUSTRATIONS["frictions-by-engine"] = _frictions_by_engine()
 ILLUSTRATIONS["validation"] = _validation()
@@ -739,6 +753,9 @@ def _of_comparison(compared: Mapping[str, Any]) -> dict[str, str]:
     for row in compared["curve"]:
         if row["of"] == "Fig. 2, 5 g":
             numbers["by_frequency_5g"] = f"{row['by_frequency']:.2f}"
+        name = "_".join(re.findall(r"\w+", row["of"].lower()))
+        numbers[f"{name}_engine"] = f"{row['engine']:.3g}"
+        numbers[f"{name}_paper"] = f"{row['curve']:.3g}"
     return numbers
 
 
