@@ -190,6 +190,12 @@ def has_outputs(page: Path) -> bool:
 
 
 @pytest.mark.parametrize("page", list(filter(has_outputs, PAGES)), ids=path_in_project)
+def test_no_line_begins_with_the_mark_of_a_number(page: Path) -> None:
+    """A comment at the beginning of a line ends the paragraph."""
+    assert re.findall(r"^\s*<!--fact .*", prose(page), re.MULTILINE) == []
+
+
+@pytest.mark.parametrize("page", list(filter(has_outputs, PAGES)), ids=path_in_project)
 def test_numbers_and_outputs_on_pages_are_todays(
     page: Path, once: Callable[[str, Callable[[Path], object]], Path]
 ) -> None:
