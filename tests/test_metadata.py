@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -74,3 +76,60 @@ def test_a_link_at_the_top_refuses_to_be_a_second_copy_of_a_package(room: str) -
     assert done.returncode == 1
     message = f"ImportError: {room} is a link to the package walkers.{room}: import walkers.{room}"
     assert done.stderr.splitlines()[-1] == message
+
+
+# --- what `make` installs -------------------------------------------------------------------------
+
+
+@pytest.fixture
+def bare_folder(tmp_path: Path) -> Path:
+    """A folder with the Makefile and what it reads, but without an environment."""
+    for name in ("Makefile", "requirements.txt", "pyproject.toml"):
+        shutil.copy(ROOT / name, tmp_path)
+    return tmp_path
+
+
+def _make(folder: Path, *arguments: str) -> str:
+    """What `make` prints in a folder."""
+    # The options of a `make` that started the tests are not for this one.
+    environment = {name: value for name, value in os.environ.items() if "MAKE" not in name}
+    return subprocess.run(
+        ["make", "--no-print-directory", *arguments],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+
+
+def test_make_tells_what_it_is_going_to_install(bare_folder: Path) -> None:
+    packages = _match("^ENGINE := (.*)", "Makefile")
+    assert _make(bare_folder, "plan", "NEEDED_engine=sh no-such-command").splitlines() == [
+        f"to install with apt-get (1 GB): {packages}",
+        "to install with pip into .venv (1.2 GB): granular-walkers[film] and what it needs",
+    ]
+
+
+def test_make_tells_nothing_if_it_installs_nothing(bare_folder: Path) -> None:
+    (bare_folder / ".venv").mkdir()
+    (bare_folder / ".venv" / "ready").touch()
+    assert not _make(bare_folder, "plan", "NEEDED_engine=sh /usr")
+
+
+@pytest.mark.parametrize(
+    ("target", "extra", "groups"),
+    [
+        ("walker", "film", ["liggghts"]),
+        ("pile", "film", ["liggghts"]),
+        ("test", "dev", ["liggghts", "slurm-wlm", "chromium"]),
+    ],
+)
+def test_a_target_tells_what_it_installs_before_it_does(
+    target: str, extra: str, groups: list[str], bare_folder: Path
+) -> None:
+    commands = _make(bare_folder, "--dry-run", target)
+    told, _, rest = commands.partition(f"granular-walkers[{extra}] and what it needs")
+    assert re.findall(r"apt-get \([^)]*\): ([\w-]+)", told) == groups
+    assert "apt-get install" not in told
+    assert "apt-get install" in rest
