@@ -9,8 +9,10 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
@@ -133,3 +135,41 @@ def test_a_target_tells_what_it_installs_before_it_does(
     assert re.findall(r"apt-get \([^)]*\): ([\w-]+)", told) == groups
     assert "apt-get install" not in told
     assert "apt-get install" in rest
+
+
+# --- files for GitHub -----------------------------------------------------------------------------
+
+FORMS = sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("[!c]*.yml"))
+WORKFLOWS = sorted((ROOT / ".github" / "workflows").glob("*.yml"))
+
+
+def _yaml(path: Path) -> dict[str, Any]:
+    """A YAML file. Its key ``on`` is True: YAML 1.1 takes it for a word for yes."""
+    return yaml.safe_load(path.read_text("utf-8"))
+
+
+@pytest.mark.parametrize("workflow", WORKFLOWS, ids=lambda path: path.stem)
+def test_a_workflow_has_shell_steps_that_a_shell_reads(workflow: Path) -> None:
+    content = _yaml(workflow)
+    assert True in content
+    steps = [step for job in content["jobs"].values() for step in job["steps"]]
+    for step in steps:
+        assert ("run" in step) != ("uses" in step)
+        if "run" in step:
+            subprocess.run(["bash", "-n", "-c", step["run"]], check=True)
+
+
+@pytest.mark.parametrize("form", FORMS, ids=lambda path: path.stem)
+def test_a_form_of_an_issue_has_what_github_asks_for(form: Path) -> None:
+    content = _yaml(form)
+    assert {"name", "description", "body"} <= content.keys()
+    fields = [field["id"] for field in content["body"]]
+    assert len(set(fields)) == len(fields)
+    for field in content["body"]:
+        assert field["type"] in {"textarea", "input"}
+        assert field["attributes"]["label"]
+
+
+def test_dependabot_watches_the_actions_and_the_packages() -> None:
+    updates = _yaml(ROOT / ".github" / "dependabot.yml")["updates"]
+    assert [update["package-ecosystem"] for update in updates] == ["github-actions", "pip"]
