@@ -159,6 +159,17 @@ def test_a_workflow_has_shell_steps_that_a_shell_reads(workflow: Path) -> None:
             subprocess.run(["bash", "-n", "-c", step["run"]], check=True)
 
 
+def test_the_tests_run_on_each_debian_whose_python_the_package_names() -> None:
+    job = _yaml(ROOT / ".github" / "workflows" / "test.yml")["jobs"]["test"]
+    assert job["strategy"]["matrix"]["debian"] == ["bookworm", "trixie"]
+    versions = []
+    for classifier in PROJECT["classifiers"]:
+        match = re.fullmatch(r"Programming Language :: Python :: (3\.\d+)", classifier)
+        if match:
+            versions.append(match[1])
+    assert versions == ["3.11", "3.13"]  # of these two
+
+
 @pytest.mark.parametrize("form", FORMS, ids=lambda path: path.stem)
 def test_a_form_of_an_issue_has_what_github_asks_for(form: Path) -> None:
     content = _yaml(form)
@@ -173,3 +184,9 @@ def test_a_form_of_an_issue_has_what_github_asks_for(form: Path) -> None:
 def test_dependabot_watches_the_actions_and_the_packages() -> None:
     updates = _yaml(ROOT / ".github" / "dependabot.yml")["updates"]
     assert [update["package-ecosystem"] for update in updates] == ["github-actions", "pip"]
+
+
+def test_the_package_says_that_it_has_types() -> None:
+    assert (ROOT / "walkers" / "py.typed").read_bytes() == b""
+    assert "Typing :: Typed" in PROJECT["classifiers"]
+    assert PYPROJECT["tool"]["setuptools"]["package-data"]["walkers"] == ["py.typed"]
