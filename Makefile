@@ -134,10 +134,11 @@ SIZE_film := 1.2 GB
 SIZE_dev := 1.8 GB
 
 # Debian packages of targets, the commands and files without which they are installed, and their size on a bare Debian.
-# The engine, what its contact model is compiled with, and Mesa, by which pictures are drawn without a screen.
-ENGINE := liggghts openmpi-bin g++ libliggghts-dev libopenmpi-dev libegl1 libgl1 libgl1-mesa-dri libxrender1
+# The engine, what its contact model is compiled with, Mesa, by which pictures are drawn without a screen, and `ip`, by
+# which mpirun is kept off the network.
+ENGINE := liggghts openmpi-bin g++ libliggghts-dev libopenmpi-dev libegl1 libgl1 libgl1-mesa-dri libxrender1 iproute2
 PACKAGES_engine := $(ENGINE)
-NEEDED_engine := liggghts mpirun g++ mpicxx /usr/include/liggghts /usr/lib/*/libEGL.so.1
+NEEDED_engine := liggghts mpirun g++ mpicxx /usr/include/liggghts /usr/lib/*/libEGL.so.1 ip
 SIZE_engine := 1 GB
 PACKAGES_chromium := chromium
 NEEDED_chromium := chromium

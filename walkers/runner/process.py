@@ -120,7 +120,9 @@ def off_the_network() -> tuple[str, ...]:
             )
             return prefix
     warnings.warn(
-        "mpirun listens on all networks: unshare (util-linux) cannot take them away", stacklevel=2
+        "mpirun listens on all networks: unshare (util-linux) and ip (iproute2), which take them "
+        "away, are missing or forbidden",
+        stacklevel=2,
     )
     return ()
 
