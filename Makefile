@@ -113,40 +113,60 @@ clean: ## Remove the environment and caches, never the runs
 extras: setup .venv/with-all ## Install what reports, archives, calibrations, the theory, checks and clusters need
 
 .PHONY: setup
-setup: engine .venv/ready ## Install what is missing: liggghts and what compiles its contact model (apt-get), and .venv
+setup: plan engine .venv/ready ## Install what is missing: liggghts and what compiles its contact model (apt-get), and .venv
 	@# Where PYTHONDONTWRITEBYTECODE is set, each command would compile what it imports: half of its time.
 	@.venv/bin/python -m compileall -q walkers
 	@.venv/bin/python -c "from walkers.runner.compiled_model import compile_model; compile_model()"
 
-# Debian packages of targets, and the commands and files without which they are installed.
-# The engine, what its contact model is compiled with, and Mesa, by which pictures are drawn without a screen.
-ENGINE := liggghts openmpi-bin g++ libliggghts-dev libopenmpi-dev libegl1 libgl1 libgl1-mesa-dri libxrender1
-engine: PACKAGES := $(ENGINE)
-engine: NEEDED := liggghts mpirun g++ mpicxx /usr/include/liggghts /usr/lib/*/libEGL.so.1
-chromium: PACKAGES := chromium
-chromium: NEEDED := chromium
-paraview: PACKAGES := paraview python3-paraview xvfb xauth
-paraview: NEEDED := pvpython xvfb-run
-pandoc: PACKAGES := pandoc
-pandoc: NEEDED := pandoc
-codes: PACKAGES := lammps yade
-codes: NEEDED := lmp yade
-venv-package: PACKAGES := python3-venv
-venv-package: NEEDED := /usr/lib/python3*/ensurepip
+# What `make` is going to install, in a line each, before it begins. DEBIAN and EXTRA are those of the target.
+DEBIAN := engine
+EXTRA := film
+test: DEBIAN := engine cluster chromium
+test: EXTRA := dev
+.PHONY: plan
+plan:
+	@$(foreach group,$(DEBIAN),$(call has,$(group)) || \
+	  echo "to install with apt-get ($(SIZE_$(group))): $(PACKAGES_$(group))";) \
+	ready=.venv/$(if $(filter film,$(EXTRA)),ready,with-$(EXTRA)); \
+	if [ requirements.txt -nt $$ready ] || [ pyproject.toml -nt $$ready ]; then \
+	  echo "to install with pip into .venv ($(SIZE_$(EXTRA))): granular-walkers[$(EXTRA)] and what it needs"; fi
+SIZE_film := 1.2 GB
+SIZE_dev := 1.8 GB
+
+# Debian packages of targets, the commands and files without which they are installed, and their size on a bare Debian.
+# The engine, what its contact model is compiled with, Mesa, by which pictures are drawn without a screen, and `ip`, by
+# which mpirun is kept off the network.
+ENGINE := liggghts openmpi-bin g++ libliggghts-dev libopenmpi-dev libegl1 libgl1 libgl1-mesa-dri libxrender1 iproute2
+PACKAGES_engine := $(ENGINE)
+NEEDED_engine := liggghts mpirun g++ mpicxx /usr/include/liggghts /usr/lib/*/libEGL.so.1 ip
+SIZE_engine := 1 GB
+PACKAGES_chromium := chromium
+NEEDED_chromium := chromium
+SIZE_chromium := 0.5 GB
+PACKAGES_paraview := paraview python3-paraview xvfb xauth
+NEEDED_paraview := pvpython xvfb-run
+PACKAGES_pandoc := pandoc
+NEEDED_pandoc := pandoc
+PACKAGES_codes := lammps yade
+NEEDED_codes := lmp yade
+PACKAGES_venv-package := python3-venv
+NEEDED_venv-package := /usr/lib/python3*/ensurepip
 # The tests start a throw-away SLURM of their own where they are root; elsewhere they leave that out and say so.
-cluster: PACKAGES := slurm-wlm munge
-cluster: NEEDED := $(if $(filter 0,$(shell id -u)),/usr/sbin/slurmctld)
+PACKAGES_cluster := slurm-wlm munge
+NEEDED_cluster := $(if $(filter 0,$(shell id -u)),/usr/sbin/slurmctld)
+SIZE_cluster := 40 MB
+# Whether all commands and files of a group are there.
+has = ( for needed in $(NEEDED_$(1)); do command -v $$needed || ls -d $$needed || exit 1; done ) >/dev/null 2>&1
 
 # As root, through sudo, or with one message for whoever is root.
 # Without what Debian recommends: with liggghts that is ParaView, 2.4 GB.
 .PHONY: engine chromium paraview pandoc codes venv-package cluster
 engine chromium paraview pandoc codes venv-package cluster:
-	@missing=; sudo=; for needed in $(NEEDED); do command -v $$needed || ls -d $$needed || missing=yes; done >/dev/null 2>&1; \
-	[ "$$missing" ] || exit 0; echo "installing $(PACKAGES)"; \
+	@$(call has,$@) && exit 0; sudo=; echo "installing $(PACKAGES_$@)"; \
 	if [ "$$(id -u)" != 0 ]; then sudo=sudo; command -v sudo >/dev/null && { [ -t 0 ] || sudo -n true 2>/dev/null; } || { \
-	  echo "$@ is missing and cannot be installed without root. Ask an administrator to run: apt-get install $(PACKAGES)" >&2; exit 1; }; fi; \
+	  echo "$@ is missing and cannot be installed without root. Ask an administrator to run: apt-get install $(PACKAGES_$@)" >&2; exit 1; }; fi; \
 	$$sudo apt-get update -qq && \
-	$$sudo env RUNLEVEL=1 DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(PACKAGES) >/dev/null
+	$$sudo env RUNLEVEL=1 DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends $(PACKAGES_$@) >/dev/null
 
 .venv/ready: requirements.txt pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "Python 3.11 or newer is needed: make PYTHON=/path/to/python3.11" >&2; exit 1; }

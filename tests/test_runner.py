@@ -13,6 +13,7 @@ import re
 import shutil
 import signal
 import subprocess
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
@@ -1000,6 +1001,7 @@ def _set_all(monkeypatch: pytest.MonkeyPatch, variables: dict[str, str]) -> None
     plugin_of(find_engine())
     for variable, value in variables.items():
         monkeypatch.setenv(variable, value)
+    monkeypatch.setattr(tempfile, "tempdir", None)  # Python, too, looks at TMPDIR again
 
 
 @pytest.mark.parametrize(
@@ -1014,6 +1016,17 @@ def test_what_a_user_has_set_in_the_environment_does_not_matter(
 ) -> None:
     _set_all(monkeypatch, variables)
     assert not run_case(make_case(run=SHORT), tmp_path).cached
+
+
+def test_an_engine_leaves_nothing_in_the_folder_for_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Open MPI 5 would leave a folder of each start."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    _set_all(monkeypatch, {"TMPDIR": str(folder)})
+    assert not run_case(make_case(run=SHORT), tmp_path / "runs").cached
+    assert not list(folder.iterdir())
 
 
 def test_what_a_user_has_set_for_mpi_does_not_matter_to_several_processes(

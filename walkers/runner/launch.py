@@ -13,7 +13,7 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -320,13 +320,27 @@ class _Watch:
         self, command: Sequence[str], on_step: Callable[[int], None], keep_open: Sequence[int]
     ) -> EngineReport:
         """Start an engine and watch it to its end; the arguments are those of `launch`."""
+        with engine_environment(self.layout.ranks) as environment:
+            status = self._run_to_the_end(command, environment, on_step, keep_open)
+        report = self.verdict(status)
+        on_step(self.step)
+        return report
+
+    def _run_to_the_end(
+        self,
+        command: Sequence[str],
+        environment: Mapping[str, str],
+        on_step: Callable[[int], None],
+        keep_open: Sequence[int],
+    ) -> int:
+        """Start an engine, watch it until it ends, and return its exit status."""
         process = None
         try:
             with postponed_interrupts(), self.log.open("wb") as output:
                 process = subprocess.Popen(
                     command,
                     cwd=self.directory,
-                    env=engine_environment(self.layout.ranks),
+                    env=environment,
                     stdin=subprocess.DEVNULL,
                     stdout=output,
                     stderr=subprocess.STDOUT,
@@ -344,9 +358,7 @@ class _Watch:
             if process is not None:
                 end_process(process)
                 self._shorten_log()
-        report = self.verdict(process.returncode)
-        on_step(self.step)
-        return report
+        return process.returncode
 
     def _shorten_log(self) -> None:
         """Cut the log at its limit, beyond which the engine may have written before it ended."""

@@ -9,6 +9,7 @@ import os
 import shutil
 import signal
 import subprocess
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -18,7 +19,7 @@ from walkers.warning import warn_user
 
 ALONE = {
     "OMPI_MCA_ess_singleton_isolated": "1",  # no orted
-    "OMPI_MCA_orte_create_session_dirs": "0",  # no folder in TMPDIR
+    "OMPI_MCA_orte_create_session_dirs": "0",  # no folder in TMPDIR; Open MPI 5 ignores it
     "OMPI_MCA_btl": "self",  # no network
     "OMPI_MCA_pml": "ob1",  # no search for a network, which takes half of the time
 }
@@ -119,14 +120,33 @@ def off_the_network() -> tuple[str, ...]:
                 [*prefix, "true"], stdin=subprocess.DEVNULL, capture_output=True, check=True
             )
             return prefix
-    warn_user("mpirun listens on all networks: unshare (util-linux) cannot take them away")
+    warn_user(
+        "mpirun listens on all networks: unshare (util-linux) and ip (iproute2), which take them "
+        "away, are missing or forbidden"
+    )
     return ()
 
 
-def engine_environment(ranks: int) -> dict[str, str]:
-    """The environment of an engine with so many MPI processes: the user's, without `_HIDDEN`."""
+@contextmanager
+def engine_environment(ranks: int) -> Iterator[dict[str, str]]:
+    """The environment of an engine for as long as it runs: the user's, without `_HIDDEN`.
+
+    A single process has a folder for temporary files of its own, which is removed at the end of
+    the block. Open MPI 5 makes a folder in TMPDIR at each start and leaves it there; if it cannot
+    make it, the engine goes on without MPI and dies of SIGSEGV. The folder is in /tmp, or where
+    else files can be written, if TMPDIR of the user does not exist or is read-only.
+
+    Parameters
+    ----------
+    ranks
+        Number of MPI processes.
+    """
     inherited = {name: value for name, value in os.environ.items() if not name.startswith(_HIDDEN)}
-    return inherited | (_RANKS if ranks > 1 else ALONE)
+    if ranks > 1:
+        yield inherited | _RANKS
+        return
+    with tempfile.TemporaryDirectory(prefix="walkers-", ignore_cleanup_errors=True) as folder:
+        yield inherited | ALONE | {"TMPDIR": folder}
 
 
 @contextmanager
