@@ -52,6 +52,7 @@ from walkers.runner.binary import find_engine
 from walkers.runner.failures import RunBusy
 from walkers.runs.by_hand import as_run, take_in, write_folder
 from walkers.runs.comparison import ComparedRun, Comparison, compare_runs
+from walkers.runs.engine_log import follow_log, read_log
 from walkers.runs.listing import run_text
 from walkers.runs.making import make_runs, progress_at
 from walkers.runs.names import (
@@ -384,6 +385,41 @@ class Run:
             If the run is not finished or has no such table.
         """
         return read_table(self.finished_directory, name)
+
+    def log(self) -> str:
+        """The engine's log, also of an unfinished run: of all segments, in order.
+
+        Returns
+        -------
+        str
+            The log. A line such as ``==> segments/0001/engine.log <==`` begins each segment.
+
+        Raises
+        ------
+        InputError
+            If there is no log.
+
+        Examples
+        --------
+        >>> "LIGGGHTS" in walkers.run("fig1b", tmp).log()
+        True
+        """
+        return read_log(self.directory)
+
+    def follow_log(self) -> Iterator[str]:
+        """Yield the engine's log in pieces as it grows, until the run ends.
+
+        Yields
+        ------
+        str
+            What has been added to the log; see `log`.
+
+        Raises
+        ------
+        InputError
+            If the run has ended without a log.
+        """
+        return follow_log(self.directory)
 
     def describe(self, *, verbose: bool = False) -> str:
         """The result as text in mm, mm/s and degrees; of an unfinished run, its progress.

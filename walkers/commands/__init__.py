@@ -79,6 +79,15 @@ ALL_COMMANDS = (
         ),
     ),
     Command(
+        name="log",
+        heading=_LOOK,
+        place="walkers.commands.look:log",
+        summary=(
+            "Print the engine's log of a run, finished or not; of a pile, that of all "
+            "segments in order."
+        ),
+    ),
+    Command(
         name="plot",
         heading=_LOOK,
         place="walkers.commands.look:plot",

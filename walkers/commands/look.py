@@ -136,6 +136,28 @@ def plot(
     print_lines(loaded.plot(to, **vars(options)))
 
 
+def log(
+    run: RunArgument,
+    /,
+    *,
+    lookup: LookupOptions = LookupOptions(),
+    follow: Annotated[bool, Parameter(("--follow", "-f"))] = False,
+) -> None:
+    """Print the engine's log of a run, finished or not; of a pile, that of all segments in order.
+
+    Parameters
+    ----------
+    follow
+        Also print what is added, until the run ends.
+    """
+    loaded = lookup.run(run)
+    if not follow:
+        print(loaded.log(), end="")
+        return
+    for piece in loaded.follow_log():
+        print(piece, end="", flush=True)
+
+
 def render(
     run: RunArgument,
     /,
