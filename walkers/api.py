@@ -45,11 +45,12 @@ from walkers.postprocess.show.report.page import REPORT_NAME
 from walkers.postprocess.show.report.player import player_of
 from walkers.postprocess.show.report.run import report_run, result_html
 from walkers.postprocess.show.series import render_series
+from walkers.postprocess.show.start import render_start
 from walkers.progress import Progress, in_notebook, progress_of
 from walkers.runner import run_directory
 from walkers.runner.audit import check_audit
 from walkers.runner.binary import find_engine
-from walkers.runner.failures import RunBusy
+from walkers.runner.failures import EngineMissing, RunBusy
 from walkers.runs.by_hand import as_run, take_in, write_folder
 from walkers.runs.comparison import ComparedRun, Comparison, compare_runs
 from walkers.runs.engine_log import follow_log, read_log
@@ -1287,6 +1288,66 @@ def sweep(
                 )
             failures += drawn.failures
     return Sweep(record.directory, tuple(failures))
+
+
+# --- before a run ---------------------------------------------------------------------------------
+
+
+def draw_start(
+    case: Given | Reference,
+    to: str | Path | None = None,
+    out: str | Path = DEFAULT_OUT,
+    changes: Changes = None,
+    *,
+    walker: int | None = None,
+) -> Pictures:
+    """Draw the start of a case: beads, walls with their names, axes and direction of the drive.
+
+    No engine is needed.
+
+    Parameters
+    ----------
+    case
+        A case (resolved, tables, file or shipped name), or the name or directory of a run.
+    to
+        The file, a PNG; default: ``NAME-start.png`` in the current folder.
+    out
+        Folder of the run directories.
+    changes
+        Other values of the case, by dotted keys.
+    walker
+        Number of the walker to show by itself, from 0; default: the first of independent walkers,
+        otherwise all beads.
+
+    Returns
+    -------
+    Pictures
+        The written file, which a notebook shows.
+
+    Raises
+    ------
+    InputError
+        If the case cannot be used, the file is not a PNG, or the case has no such walker.
+
+    Examples
+    --------
+    >>> [path.name for path in walkers.draw_start("fig1b", tmp / "start.png")]
+    ['start.png']
+    """
+    drawn = find(case, out, changes).case
+    default = Path(f"{run_directory.name_of(drawn.name)}-start.png")
+    return Pictures(render_start(drawn, _path(to) or default, walker=walker))
+
+
+def has_not_begun(reference: Reference) -> bool:
+    """Whether a name means a case of which there is no run, finished or begun."""
+    if not reference.means_case:
+        return False
+    try:
+        place = run_directory.run_place(reference.case, find_engine(), reference.folder)
+    except EngineMissing:
+        return True
+    return not run_directory.is_finished(place) and not is_begun(place)
 
 
 # --- several runs ---------------------------------------------------------------------------------

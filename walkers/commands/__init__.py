@@ -100,7 +100,10 @@ ALL_COMMANDS = (
         name="render",
         heading=_LOOK,
         place="walkers.commands.look:render",
-        summary="Render pictures of a run at several times, or a film with --film.",
+        summary=(
+            "Render pictures of a run at several times, or a film with --film; before any "
+            "run, the start of the case."
+        ),
     ),
     Command(
         name="report",
