@@ -92,6 +92,7 @@ __all__ = [
     "calibrate",
     "climb",
     "compare",
+    "draw_start",
     "load",
     "load_case",
     "new",
@@ -119,7 +120,18 @@ _PACKAGES = (
 )
 """Packages that are attributes of this one without an import by the user."""
 _NAMES_OF_MODULES = {
-    "api": ("Run", "Sweep", "calibrate", "climb", "compare", "load", "predict", "run", "sweep"),
+    "api": (
+        "Run",
+        "Sweep",
+        "calibrate",
+        "climb",
+        "compare",
+        "draw_start",
+        "load",
+        "predict",
+        "run",
+        "sweep",
+    ),
     "calibration.calibrate": ("CalibrationStopped",),
     "errors": ("InputError", "InputErrors", "WalkersError"),
     "extras": ("ExtraMissing",),

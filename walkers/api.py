@@ -45,13 +45,15 @@ from walkers.postprocess.show.report.page import REPORT_NAME
 from walkers.postprocess.show.report.player import player_of
 from walkers.postprocess.show.report.run import report_run, result_html
 from walkers.postprocess.show.series import render_series
+from walkers.postprocess.show.start import render_start
 from walkers.progress import Progress, in_notebook, progress_of
 from walkers.runner import run_directory
 from walkers.runner.audit import check_audit
 from walkers.runner.binary import find_engine
-from walkers.runner.failures import RunBusy
+from walkers.runner.failures import EngineMissing, RunBusy
 from walkers.runs.by_hand import as_run, take_in, write_folder
 from walkers.runs.comparison import ComparedRun, Comparison, compare_runs
+from walkers.runs.engine_log import follow_log, read_log
 from walkers.runs.listing import run_text
 from walkers.runs.making import make_runs, progress_at
 from walkers.runs.names import (
@@ -384,6 +386,41 @@ class Run:
             If the run is not finished or has no such table.
         """
         return read_table(self.finished_directory, name)
+
+    def log(self) -> str:
+        """The engine's log, also of an unfinished run: of all segments, in order.
+
+        Returns
+        -------
+        str
+            The log. A line such as ``==> segments/0001/engine.log <==`` begins each segment.
+
+        Raises
+        ------
+        InputError
+            If there is no log.
+
+        Examples
+        --------
+        >>> "LIGGGHTS" in walkers.run("fig1b", tmp).log()
+        True
+        """
+        return read_log(self.directory)
+
+    def follow_log(self) -> Iterator[str]:
+        """Yield the engine's log in pieces as it grows, until the run ends.
+
+        Yields
+        ------
+        str
+            What has been added to the log; see `log`.
+
+        Raises
+        ------
+        InputError
+            If the run has ended without a log.
+        """
+        return follow_log(self.directory)
 
     def describe(self, *, verbose: bool = False) -> str:
         """The result as text in mm, mm/s and degrees; of an unfinished run, its progress.
@@ -1251,6 +1288,66 @@ def sweep(
                 )
             failures += drawn.failures
     return Sweep(record.directory, tuple(failures))
+
+
+# --- before a run ---------------------------------------------------------------------------------
+
+
+def draw_start(
+    case: Given | Reference,
+    to: str | Path | None = None,
+    out: str | Path = DEFAULT_OUT,
+    changes: Changes = None,
+    *,
+    walker: int | None = None,
+) -> Pictures:
+    """Draw the start of a case: beads, walls with their names, axes and direction of the drive.
+
+    No engine is needed.
+
+    Parameters
+    ----------
+    case
+        A case (resolved, tables, file or shipped name), or the name or directory of a run.
+    to
+        The file, a PNG; default: ``NAME-start.png`` in the current folder.
+    out
+        Folder of the run directories.
+    changes
+        Other values of the case, by dotted keys.
+    walker
+        Number of the walker to show by itself, from 0; default: the first of independent walkers,
+        otherwise all beads.
+
+    Returns
+    -------
+    Pictures
+        The written file, which a notebook shows.
+
+    Raises
+    ------
+    InputError
+        If the case cannot be used, the file is not a PNG, or the case has no such walker.
+
+    Examples
+    --------
+    >>> [path.name for path in walkers.draw_start("fig1b", tmp / "start.png")]
+    ['start.png']
+    """
+    drawn = find(case, out, changes).case
+    default = Path(f"{run_directory.name_of(drawn.name)}-start.png")
+    return Pictures(render_start(drawn, _path(to) or default, walker=walker))
+
+
+def has_not_begun(reference: Reference) -> bool:
+    """Whether a name means a case of which there is no run, finished or begun."""
+    if not reference.means_case:
+        return False
+    try:
+        place = run_directory.run_place(reference.case, find_engine(), reference.folder)
+    except EngineMissing:
+        return True
+    return not run_directory.is_finished(place) and not is_begun(place)
 
 
 # --- several runs ---------------------------------------------------------------------------------

@@ -79,6 +79,15 @@ ALL_COMMANDS = (
         ),
     ),
     Command(
+        name="log",
+        heading=_LOOK,
+        place="walkers.commands.look:log",
+        summary=(
+            "Print the engine's log of a run, finished or not; of a pile, that of all "
+            "segments in order."
+        ),
+    ),
+    Command(
         name="plot",
         heading=_LOOK,
         place="walkers.commands.look:plot",
@@ -91,7 +100,10 @@ ALL_COMMANDS = (
         name="render",
         heading=_LOOK,
         place="walkers.commands.look:render",
-        summary="Render pictures of a run at several times, or a film with --film.",
+        summary=(
+            "Render pictures of a run at several times, or a film with --film; before any "
+            "run, the start of the case."
+        ),
     ),
     Command(
         name="report",

@@ -10,6 +10,7 @@ from cyclopts import Parameter
 
 import walkers
 from walkers import DEFAULT_OUT
+from walkers.api import has_not_begun
 from walkers.commands.options import (
     FormatsOption,
     JsonOption,
@@ -22,10 +23,12 @@ from walkers.commands.options import (
     print_lines,
     refuse,
     refuse_any,
+    run_of,
     tell,
 )
 from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.postprocess.show.film_options import FilmOptions, Seconds
+from walkers.postprocess.show.start import NOTHING_HAS_RUN
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.terminal import table_width
 
@@ -136,6 +139,28 @@ def plot(
     print_lines(loaded.plot(to, **vars(options)))
 
 
+def log(
+    run: RunArgument,
+    /,
+    *,
+    lookup: LookupOptions = LookupOptions(),
+    follow: Annotated[bool, Parameter(("--follow", "-f"))] = False,
+) -> None:
+    """Print the engine's log of a run, finished or not; of a pile, that of all segments in order.
+
+    Parameters
+    ----------
+    follow
+        Also print what is added, until the run ends.
+    """
+    loaded = lookup.run(run)
+    if not follow:
+        print(loaded.log(), end="")
+        return
+    for piece in loaded.follow_log():
+        print(piece, end="", flush=True)
+
+
 def render(
     run: RunArgument,
     /,
@@ -147,12 +172,14 @@ def render(
     options: FilmOptions = FilmOptions(),
     quiet: QuietOption = False,
 ) -> None:
-    """Render pictures of a run at several times, or a film with --film.
+    """Render pictures of a run at several times, or a film with --film; before any run, the start
+    of the case.
 
     Parameters
     ----------
     to
-        File to write: .png; films: .mp4, .gif; default: in the run's folder.
+        File to write: .png; films: .mp4, .gif; default: in the run's folder; the start of a case:
+        CASE-start.png in the current folder.
     images
         Largest number of pictures; default: 6.
     film
@@ -165,8 +192,15 @@ def render(
     defaults = vars(FilmOptions(walker=options.walker))
     changed = {name: value != defaults[name] for name, value in vars(options).items()}
     refuse_any(changed, "is for --film")
+    reference = lookup.find(run)
+    if has_not_begun(reference):
+        refuse("--images", images is not None, NOTHING_HAS_RUN)
+        print_lines(walkers.draw_start(reference, to, walker=options.walker))
+        if not quiet:
+            tell(f"{reference.case.name}: {NOTHING_HAS_RUN}")
+        return
     number = 6 if images is None else images
-    print_lines(lookup.run(run).render(to, images=number, walker=options.walker))
+    print_lines(run_of(reference).render(to, images=number, walker=options.walker))
 
 
 def report(

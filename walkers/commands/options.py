@@ -131,13 +131,18 @@ class LookupOptions:
 
     def run(self, name: str) -> Run:
         """The named run; `InputError` if the name is that of a sweep."""
-        from walkers.api import Run
-        from walkers.runs.names import not_a_run
+        return run_of(self.find(name))
 
-        loaded = self.load(name)
-        if not isinstance(loaded, Run):
-            raise not_a_run(name, "sweep")
-        return loaded
+
+def run_of(reference: Reference) -> Run:
+    """The run that a reference means; `InputError` if it means a sweep."""
+    from walkers.api import Run, load
+    from walkers.runs.names import not_a_run
+
+    loaded = load(reference)
+    if not isinstance(loaded, Run):
+        raise not_a_run(reference.given, "sweep")
+    return loaded
 
 
 def refuse(option: str, is_wrong: bool, reason: str) -> None:

@@ -44,7 +44,7 @@ from walkers.templates import deck as decks
 from walkers.templates.deck import Segment
 from walkers.templates.parameters import PRINTED, suffixes
 
-_LOGS = (decks.OUTPUT_NAME, "log.liggghts")
+LOG_NAMES = (decks.OUTPUT_NAME, "log.liggghts")
 """Output of the engine by `write_run_script`, and the default log of LIGGGHTS."""
 _PRINTED_LINE = re.compile(rf"^{PRINTED} (.+)$", re.MULTILINE)
 """Line of a log with the names and values of all parameters."""
@@ -185,9 +185,9 @@ def take_in(folder: Path) -> None:
         If the deck was not run, is still running, or failed, or if its files cannot be read.
     """
     deck = folder / decks.DECK_NAME
-    logs = [folder / name for name in _LOGS if (folder / name).is_file()]
+    logs = [folder / name for name in LOG_NAMES if (folder / name).is_file()]
     if not logs:
-        expected = f"expected a log of the engine, {' or '.join(_LOGS)}"
+        expected = f"expected a log of the engine, {' or '.join(LOG_NAMES)}"
         command = f"cd {folder} && sh {decks.RUN_NAME}"
         raise input_error(folder, f"the deck was not run ({expected}); do: {command}")
     log = max(logs, key=_modified)

@@ -168,6 +168,8 @@ class Scene:
         roll.
     camera_path : ndarray, shape (F, 3), or None
         Displacement of the camera in each frame, mm; None for a camera at rest.
+    has_tables
+        Whether the run has been measured, so that its tables tell which clusters climb.
     """
 
     motion: Motion
@@ -177,6 +179,7 @@ class Scene:
     shaken: bool = True
     rolling: bool = False
     camera_path: FloatArray | None = None
+    has_tables: bool = True
 
     @classmethod
     def around(
@@ -302,7 +305,7 @@ class Scene:
         """Highlighted beads in each frame: walkers and climbing clusters; shape (F, N)."""
         motion = self.motion
         highlighted = np.tile(motion.walker_of >= 0, (len(motion.time), 1))
-        if piles.applies(motion.case):
+        if self.has_tables and piles.applies(motion.case):
             _, is_climber = piles.tracks_of(motion)
             highlighted = highlighted | is_climber
         return highlighted

@@ -1,0 +1,155 @@
+"""Runs that are looked at before they are finished: their logs, pictures and exports."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from signal import SIGKILL
+
+import numpy as np
+import pytest
+from PIL import Image
+from tomli_w import dumps as to_toml
+
+import walkers
+from tests.conftest import (
+    LONG,
+    PATIENCE,
+    PROGRAM,
+    brief_pile,
+    call,
+    document,
+    engines_in,
+    wait_for,
+)
+from walkers.postprocess.measure.motion import read_motion
+from walkers.postprocess.show.start import (
+    NOTHING_HAS_RUN,
+    drive_directions,
+    motion_at_start,
+    walls_by_size,
+)
+from walkers.runner.run_directory import write_case
+
+SEGMENTS = [f"==> segments/000{number}/engine.log <==" for number in range(3)]
+"""Headings of the segments of a brief pile in its log."""
+
+
+@pytest.fixture
+def pile_file(tmp_path: Path) -> Path:
+    """The file of a brief pile."""
+    file = tmp_path / "brief.toml"
+    file.write_text(to_toml(brief_pile().document))
+    return file
+
+
+def _headings(log: str) -> list[str]:
+    return [line for line in log.splitlines() if line.startswith("==> ")]
+
+
+def test_the_log_of_a_pile_is_followed_to_its_end(pile_file: Path) -> None:
+    folder = pile_file.parent
+    run = subprocess.Popen([PROGRAM, "run", pile_file.name, "-q"], cwd=folder)
+    wait_for(lambda: list(folder.glob("runs/*/segments/0000*/engine.log")))
+    followed = subprocess.run(
+        [PROGRAM, "log", pile_file.name, "--follow"],
+        cwd=folder,
+        check=True,
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+    )
+    assert run.wait(PATIENCE) == 0
+    whole = call("log", pile_file.name, check=True, folder=folder).stdout
+    assert followed.stdout == whole
+    assert _headings(whole) == SEGMENTS
+
+
+def test_an_interrupted_run_has_a_log(tmp_path: Path) -> None:
+    (tmp_path / "long.toml").write_text(to_toml(document(run=LONG)))
+    program = subprocess.Popen([PROGRAM, "run", "long.toml", "-q"], cwd=tmp_path)
+    wait_for(lambda: list(tmp_path.glob("runs/*/segments/0000.new/*.bin")))
+    os.kill(program.pid, SIGKILL)
+    program.wait()
+    wait_for(lambda: not engines_in(tmp_path))
+    run = walkers.load(tmp_path / "long.toml", tmp_path / "runs")
+    assert isinstance(run, walkers.Run)
+    assert run.log().startswith(f"{SEGMENTS[0]}\nLIGGGHTS ")
+    assert "".join(run.follow_log()) == run.log()
+
+
+def test_points_of_a_shared_deck_have_its_log(looked_through: Path) -> None:
+    directory = next(looked_through.glob("*/shared_deck")).parent
+    assert walkers.Run(directory).log().startswith("LIGGGHTS ")
+
+
+def test_a_run_without_a_log_says_so(tmp_path: Path) -> None:
+    place = tmp_path / "runs/brief-0123456789ab.incomplete"
+    (place / "segments").mkdir(parents=True)
+    write_case(place, brief_pile())
+    for options in ([], ["--follow"]):
+        done = call("log", "brief-0123456789ab", *options, folder=tmp_path)
+        assert done.returncode == 2
+        (line,) = done.stderr.splitlines()
+        assert line.endswith("the run has no log: the engine has not started yet")
+
+
+def test_render_draws_the_start_before_any_run(in_folder: Path) -> None:
+    done = call("render", "fig1b", check=True)
+    assert done.stdout == "fig1b-start.png\n"
+    assert done.stderr == f"walkers: fig1b: {NOTHING_HAS_RUN}\n"
+    assert [path.name for path in in_folder.iterdir()] == ["fig1b-start.png"]
+    with Image.open("fig1b-start.png") as picture:
+        red, _, blue = np.asarray(picture.convert("RGB"), dtype=float).transpose(2, 0, 1)
+    assert (red > blue + 60.0).mean() > 0.1  # the walker
+    call("render", "pile-ci", "--to", "there/pile.png", "-q", check=True)
+    assert Path("there/pile.png").is_file()
+
+
+def test_pictures_of_one_time_cannot_be_several(in_folder: Path) -> None:
+    done = call("render", "fig1b", "--images", "3")
+    assert done.returncode == 2
+    assert done.stderr == f"walkers: --images: {NOTHING_HAS_RUN}\n"
+    assert not list(in_folder.iterdir())
+
+
+def test_the_start_is_where_the_engine_starts(run_directory: Callable[..., Path]) -> None:
+    motion = read_motion(run_directory())
+    start = motion_at_start(motion.case)
+    assert start.position[0] == pytest.approx(motion.position[0], abs=1e-12)
+    assert start.radius == pytest.approx(motion.radius)
+    assert start.walkers == motion.walkers
+
+
+@pytest.mark.parametrize(
+    ("boundary", "names"),
+    [
+        ({"shape": "box"}, {"floor", "-x", "+x", "-y", "+y"}),
+        ({"shape": "cylinder", "width": "6 mm"}, {"floor", "side"}),
+    ],
+)
+def test_walls_are_named_where_they_are(boundary: dict[str, str], names: set[str]) -> None:
+    tables = brief_pile().document
+    case = walkers.load_case({**tables, "boundary": {**tables["boundary"], **boundary}})
+    named = walls_by_size(motion_at_start(case))
+    assert {wall.name for wall in named} == names
+    half = case.boundary.inner_width / 2.0
+    for wall in named:
+        outward = -wall.normal
+        limit = 0.0 if wall.name == "floor" else half
+        assert wall.middle @ outward == pytest.approx(limit, rel=0.01)
+        if wall.name[0] in "+-":
+            sign = 1.0 if wall.name[0] == "+" else -1.0
+            assert outward["xyz".index(wall.name[1])] == pytest.approx(sign)
+
+
+def test_harmonics_of_one_direction_have_one_arrow() -> None:
+    harmonic = {"frequency": "80 Hz", "peak_acceleration": "2 g"}
+    first = {**harmonic, "axis": "z"}
+    second = {**harmonic, "axis": "z", "frequency": "160 Hz"}
+    along = {**harmonic, "axis": "x"}
+    tables = {**document(), "drive": {"harmonics": [first, second, along]}}
+    directions = drive_directions(walkers.load_case(tables))
+    assert [direction.tolist() for direction in directions] == [[0, 0, 1], [1, 0, 0]]
