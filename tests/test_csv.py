@@ -115,8 +115,11 @@ def test_units_that_do_not_exist_are_refused(run: walkers.Run) -> None:
         run.export("csv", units="cm")  # type: ignore[arg-type]
 
 
-def test_a_sweep_in_place_of_a_run_names_the_command_of_its_table(looked_through: Path) -> None:
-    done = call("export", "grid", "--format", "csv", "--runs", str(looked_through))
+@pytest.mark.parametrize("units", [[], ["--units", "mm"]], ids=["SI", "mm"])
+def test_a_sweep_in_place_of_a_run_names_the_command_of_its_table(
+    looked_through: Path, units: list[str]
+) -> None:
+    done = call("export", "grid", "--format", "csv", *units, "--runs", str(looked_through))
     assert done.returncode == 2
     assert "walkers list " in done.stderr
     with pytest.raises(InputError, match=r"its table is given by table\(\)"):

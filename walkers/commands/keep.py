@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from walkers import DEFAULT_OUT
-from walkers.api import Export, check_export, directory_of
+from walkers.api import Export, Sweep, check_export, directory_of
 from walkers.commands.options import LookupOptions, OutOption, RunOrSweepArgument, refuse, tell
 from walkers.errors import apply_all
 from walkers.postprocess.measure.table_units import UnitSystem
@@ -80,8 +80,11 @@ def export(
     check_export(form, list(given))
     if form == "deck":
         _export_deck(name, to, lookup)
-    else:
-        print(lookup.load(name).export(form, to, **given))
+        return
+    loaded = lookup.load(name)
+    if isinstance(loaded, Sweep) and form != "archive":
+        loaded.export(form)  # refuses it; sweeps do not know the options of other forms
+    print(loaded.export(form, to, **given))
 
 
 def _given_options(options: ExportOptions) -> dict[str, Any]:
