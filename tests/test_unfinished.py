@@ -56,14 +56,7 @@ def test_the_log_of_a_pile_is_followed_to_its_end(pile_file: Path) -> None:
     folder = pile_file.parent
     run = subprocess.Popen([PROGRAM, "run", pile_file.name, "-q"], cwd=folder)
     wait_for(lambda: list(folder.glob("runs/*/segments/0000*/engine.log")))
-    followed = subprocess.run(
-        [PROGRAM, "log", pile_file.name, "--follow"],
-        cwd=folder,
-        check=True,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-    )
+    followed = call("log", pile_file.name, "--follow", check=True, folder=folder)
     assert run.wait(PATIENCE) == 0
     whole = call("log", pile_file.name, check=True, folder=folder).stdout
     assert followed.stdout == whole
