@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from collections.abc import Callable
 from pathlib import Path
@@ -18,10 +19,12 @@ from tests.conftest import (
     LONG,
     PATIENCE,
     PROGRAM,
+    FillOnce,
     brief_pile,
     call,
     document,
     engines_in,
+    make_case,
     wait_for,
 )
 from walkers.postprocess.measure.motion import read_motion
@@ -31,17 +34,17 @@ from walkers.postprocess.show.start import (
     motion_at_start,
     walls_by_size,
 )
-from walkers.runner.run_directory import write_case
+from walkers.runner.run_directory import unfinished, write_case
 
-SEGMENTS = [f"==> segments/000{number}/engine.log <==" for number in range(3)]
-"""Headings of the segments of a brief pile in its log."""
+FIRST_HEADING = "==> segments/0000/engine.log <=="
+"""First line of a log."""
 
 
 @pytest.fixture
 def pile_file(tmp_path: Path) -> Path:
-    """The file of a brief pile."""
+    """The file of a pile that runs for some seconds, longer than a program takes to start."""
     file = tmp_path / "brief.toml"
-    file.write_text(to_toml(brief_pile().document))
+    file.write_text(to_toml(brief_pile(duration="0.15 s").document))
     return file
 
 
@@ -53,18 +56,12 @@ def test_the_log_of_a_pile_is_followed_to_its_end(pile_file: Path) -> None:
     folder = pile_file.parent
     run = subprocess.Popen([PROGRAM, "run", pile_file.name, "-q"], cwd=folder)
     wait_for(lambda: list(folder.glob("runs/*/segments/0000*/engine.log")))
-    followed = subprocess.run(
-        [PROGRAM, "log", pile_file.name, "--follow"],
-        cwd=folder,
-        check=True,
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-    )
+    followed = call("log", pile_file.name, "--follow", check=True, folder=folder)
     assert run.wait(PATIENCE) == 0
     whole = call("log", pile_file.name, check=True, folder=folder).stdout
     assert followed.stdout == whole
-    assert _headings(whole) == SEGMENTS
+    segments = sorted(folder.glob("runs/*/segments/*"))
+    assert _headings(whole) == [f"==> segments/{path.name}/engine.log <==" for path in segments]
 
 
 def test_an_interrupted_run_has_a_log(tmp_path: Path) -> None:
@@ -76,7 +73,7 @@ def test_an_interrupted_run_has_a_log(tmp_path: Path) -> None:
     wait_for(lambda: not engines_in(tmp_path))
     run = walkers.load(tmp_path / "long.toml", tmp_path / "runs")
     assert isinstance(run, walkers.Run)
-    assert run.log().startswith(f"{SEGMENTS[0]}\nLIGGGHTS ")
+    assert run.log().startswith(f"{FIRST_HEADING}\nLIGGGHTS ")
     assert "".join(run.follow_log()) == run.log()
 
 
@@ -153,3 +150,66 @@ def test_harmonics_of_one_direction_have_one_arrow() -> None:
     tables = {**document(), "drive": {"harmonics": [first, second, along]}}
     directions = drive_directions(walkers.load_case(tables))
     assert [direction.tolist() for direction in directions] == [[0, 0, 1], [1, 0, 0]]
+
+
+@pytest.fixture(scope="session")
+def killed_pile(once: FillOnce) -> Path:
+    """The folder of a brief pile that was killed during its drive; its case is ``brief.toml``."""
+
+    def run_and_kill(folder: Path) -> None:
+        case = brief_pile(duration="10 s").document
+        (folder / "brief.toml").write_text(to_toml(case))
+        program = subprocess.Popen([PROGRAM, "run", "brief.toml", "-q"], cwd=folder)
+        wait_for(lambda: list(folder.glob("runs/*/segments/0004")))
+        os.kill(program.pid, SIGKILL)
+        program.wait()
+        wait_for(lambda: not engines_in(folder))
+
+    return once("killed-pile", run_and_kill)
+
+
+def test_pictures_of_a_killed_pile_show_its_complete_segments(
+    killed_pile: Path, in_folder: Path
+) -> None:
+    out = killed_pile / "runs"
+    before = sorted(out.rglob("*"))
+    complete = len(list(out.glob("*/segments/[0-9][0-9][0-9][0-9]")))
+    case = str(killed_pile / "brief.toml")
+    for command, files in {
+        "render": ["series.png"],
+        "plot": ["climb.png"],
+        "report": ["report.html"],
+    }.items():
+        done = call(command, case, "--runs", str(out), check=True)
+        assert done.stdout.splitlines() == [f"brief-so-far/{name}" for name in files]
+        assert f"brief: segments 1 to {complete} of " in done.stderr
+        assert done.stderr.endswith(": the run is interrupted\n")
+    assert f"(segments 1 to {complete} of " in Path("brief-so-far/report.html").read_text("utf-8")
+    assert sorted(out.rglob("*")) == before
+
+
+def test_the_view_of_a_killed_pile_has_its_beads(killed_pile: Path) -> None:
+    run = walkers.load(killed_pile / "brief.toml", killed_pile / "runs")
+    assert isinstance(run, walkers.Run)
+    with pytest.warns(UserWarning, match=r"brief: segments 1 to \d+ of \d+: "):
+        assert run.view().objects
+
+
+def test_the_total_of_segments_is_that_of_the_finished_run(pile_run: Path, tmp_path: Path) -> None:
+    place = tmp_path / pile_run.name
+    incomplete = unfinished(place)
+    shutil.copytree(pile_run, incomplete, ignore=shutil.ignore_patterns("manifest.json"))
+    number = len(list(incomplete.glob("segments/*")))
+    with pytest.warns(UserWarning, match=f"segments 1 to {number} of {number}: "):
+        (picture,) = walkers.Run(place).plot(tmp_path)
+    assert picture.is_file()
+    assert [path.name for path in tmp_path.glob(".*")] == []
+
+
+def test_a_run_in_one_segment_has_no_pictures_before_its_end(in_folder: Path) -> None:
+    place = in_folder / "runs/test-0123456789ab.incomplete"
+    (place / "segments").mkdir(parents=True)
+    write_case(place, make_case(run=LONG))
+    done = call("render", "test-0123456789ab")
+    assert done.returncode == 2
+    assert "the run is interrupted; continue it with: walkers run" in done.stderr

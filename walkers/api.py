@@ -9,7 +9,7 @@ from __future__ import annotations
 import shlex
 from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
@@ -44,7 +44,7 @@ from walkers.postprocess.show.films import render_film
 from walkers.postprocess.show.report.page import REPORT_NAME
 from walkers.postprocess.show.report.player import player_of
 from walkers.postprocess.show.report.run import report_run, result_html
-from walkers.postprocess.show.series import render_series
+from walkers.postprocess.show.series import SERIES_NAME, render_series
 from walkers.postprocess.show.start import render_start
 from walkers.progress import Progress, in_notebook, progress_of
 from walkers.runner import run_directory
@@ -66,6 +66,7 @@ from walkers.runs.names import (
     readable_case,
     refusing,
 )
+from walkers.runs.so_far import complete_part
 from walkers.runs.status import state_at, worst_status
 from walkers.sweeps.accuracy import measure_accuracy
 from walkers.sweeps.against_first import compare_points
@@ -222,7 +223,9 @@ class Pictures(list[Path]):
 class Run:
     """A run: finished, running, interrupted or failed.
 
-    Its results, tables and pictures raise `InputError` until it is finished.
+    Its results and tables raise `InputError` until it is finished. Figures, pictures, views and
+    reports of an unfinished run in several segments, such as a pile, show its complete segments,
+    and say so.
 
     Attributes
     ----------
@@ -300,6 +303,20 @@ class Run:
                 self.directory, f"{state}; {again}: {call}", f"{state}; {again}: {command}"
             )
         return self.directory
+
+    @contextmanager
+    def _pictured(self) -> Iterator[tuple[Path, Path | None]]:
+        """The directory of which pictures are made, and the folder of those of an unfinished run.
+
+        Of a run in several segments that is not finished, it has the complete segments
+        (`walkers.runs.so_far.complete_part`). The folder is None for a finished run: its pictures
+        are in its directory.
+        """
+        if run_directory.is_finished(self.directory) or self.case.run.has_one_segment:
+            yield self.finished_directory, None
+            return
+        with complete_part(self.directory, self.status) as directory:
+            yield directory, Path(f"{run_directory.name_of(self.case.name)}-so-far")
 
     @property
     def _files(self) -> Path:
@@ -462,7 +479,8 @@ class Run:
         InputError
             If a format does not exist, or ``to`` is the name of a picture.
         """
-        return Pictures(plot_run(self.finished_directory, _path(to), formats))
+        with self._pictured() as (directory, folder):
+            return Pictures(plot_run(directory, _path(to) or folder, formats))
 
     def render(
         self, to: str | Path | None = None, *, images: int = 6, walker: int | None = None
@@ -490,8 +508,11 @@ class Run:
         InputError
             If the file is not a PNG, or the run has no such walker.
         """
-        pictures = render_series(self.finished_directory, _path(to), images=images, walker=walker)
-        return Pictures(pictures)
+        with self._pictured() as (directory, folder):
+            place = _path(to)
+            if place is None and folder is not None:
+                place = folder / SERIES_NAME
+            return Pictures(render_series(directory, place, images=images, walker=walker))
 
     def film(
         self,
@@ -559,7 +580,8 @@ class Run:
         >>> len(walkers.run("fig1b", tmp).view().objects)  # beads, necks, substrate, its lines
         5
         """
-        return player_of(read_motion(self.finished_directory), height=height)[0]
+        with self._pictured() as (directory, _):
+            return player_of(read_motion(directory), height=height)[0]
 
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report, with the figure of the run's spread if it has one.
@@ -584,8 +606,12 @@ class Run:
         >>> walkers.run("fig1b", tmp).report(tmp / "fig1b.html").name
         'fig1b.html'
         """
-        figures = figures_of_spread(self.finished_directory)
-        return report_run(self.finished_directory, _path(to), self.origins, figures=figures)
+        with self._pictured() as (directory, folder):
+            place = _path(to)
+            if place is None and folder is not None:
+                place = folder / REPORT_NAME
+            figures = figures_of_spread(directory)
+            return report_run(directory, place, self.origins, figures=figures)
 
     def spread(
         self, points: int = 32, *, progress: bool | None = None, engine: str | None = None

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from walkers.files import CSV_SCRATCH, VTK_SCRATCH, abandoned
+from walkers.files import CSV_SCRATCH, SO_FAR_SCRATCH, VTK_SCRATCH, abandoned
 from walkers.rounding import counted, duration_text
 from walkers.runner import run_directory
 from walkers.runner.manifest import MANIFEST_NAME
@@ -118,6 +118,7 @@ def _abandoned_exports(out: Path, runs: Sequence[ListEntry]) -> list[Path]:
     for parent in parents:
         exports += abandoned(parent, VTK_SCRATCH)
         exports += abandoned(parent, CSV_SCRATCH)
+        exports += abandoned(parent, SO_FAR_SCRATCH)
     return exports
 
 

@@ -34,7 +34,7 @@ from walkers.postprocess.show.report.page import (
 )
 from walkers.postprocess.show.report.player import MOST_PLACES, player_of
 from walkers.runner.manifest import read_manifest
-from walkers.runner.run_directory import case_of
+from walkers.runner.run_directory import case_of, is_finished
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -90,7 +90,7 @@ def report_run(
         "title": motion.case.title or motion.case.name,
         "summary": f"{caption(motion.case)}.",
         "result": report_values(motion.case, results, origins),
-        "manifest": read_manifest(directory),
+        "manifest": read_manifest(directory) if is_finished(directory) else {},
         "figures": {name: svg_of(figure) for name, figure in drawn.items()},
     }
     places = MOST_PLACES

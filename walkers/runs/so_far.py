@@ -1,0 +1,85 @@
+"""The complete segments of an unfinished run, as a run directory that pictures can be made of.
+
+The directory is a copy beside the runs, of hard links, so that the run may go on, or finish, in the
+meantime. It is measured and removed in the end. The title of its case says which segments it has.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import ceil
+from pathlib import Path
+
+from walkers.errors import input_error
+from walkers.files import SO_FAR_SCRATCH, link_or_copy, read_json, scratch_folder
+from walkers.inputs.tables.case import Case
+from walkers.postprocess.measure.results import measure
+from walkers.runner import run_directory
+from walkers.templates.deck import RESTART_NAME
+from walkers.warning import warn_user
+
+
+@contextmanager
+def complete_part(place: Path, status: str) -> Iterator[Path]:
+    """Yield a measured run directory with the complete segments of an unfinished run.
+
+    Parameters
+    ----------
+    place
+        The final directory of the run.
+    status
+        Status of the run, for its title.
+
+    Yields
+    ------
+    Path
+        The directory, which is removed in the end.
+
+    Raises
+    ------
+    InputError
+        If the run has a single segment, or no segment of the drive is complete yet.
+
+    Warns
+    -----
+    UserWarning
+        With the numbers of the segments.
+    """
+    incomplete = run_directory.unfinished(place)
+    case = run_directory.case_of(incomplete)
+    segments = run_directory.segment_directories(incomplete)
+    settling = _settling_segments(segments)
+    if settling is None or case.run.has_one_segment:
+        message = f"the run is {status}, and no segment of its drive is complete yet"
+        raise input_error(place, message)
+    total = settling + ceil(case.run.cycles / case.run.cycles_per_segment)
+    part = f"segments 1 to {len(segments)} of {total}: the run is {status}"
+    warn_user(f"{case.name}: {part}")
+    with scratch_folder(place.parent, SO_FAR_SCRATCH) as folder:
+        directory = folder / place.name
+        directory.mkdir()
+        title = f"{case.title or case.name} ({part})"
+        _fill(directory, case.with_values(title=title), segments)
+        measure(directory)
+        yield directory
+
+
+def _settling_segments(segments: list[Path]) -> int | None:
+    """Number of segments before the drive; None if no segment of the drive is complete."""
+    for number, segment in enumerate(segments):
+        record = read_json(segment / run_directory.SEGMENT_NAME)
+        if record["drive_from"] is not None:
+            return number
+    return None
+
+
+def _fill(directory: Path, case: Case, segments: list[Path]) -> None:
+    """Write a case into a directory, and link the files of its segments but for restarts."""
+    run_directory.write_case(directory, case)
+    for segment in segments:
+        copy = directory / run_directory.SEGMENTS / segment.name
+        copy.mkdir(parents=True)
+        for file in segment.iterdir():
+            if file.name != RESTART_NAME:
+                link_or_copy(file, copy / file.name)
