@@ -42,7 +42,7 @@ from walkers.second_engine.scenes import (
 from walkers.templates.bridge_tables import RecordedLaw, bridge_tables
 from walkers.templates.deck import BRIDGES_NAME, render_deck
 from walkers.templates.placement import Bead
-from walkers.theory.mathieu import _AxialMotion, _sideways_edges, turning_rate
+from walkers.theory.mathieu import AxialMotion, _sideways_edges, turning_rate
 from walkers.theory.motion import Walker, predict_motion
 
 MASS = 4000.0 * 4.0 / 3.0 * pi * LARGE_RADIUS**3
@@ -215,12 +215,12 @@ def beads_of(dimer: Dimer) -> list[Bead]:
     return touching + on_floor
 
 
-def axial_motion(case: Case, dimer: Dimer) -> _AxialMotion:
+def axial_motion(case: Case, dimer: Dimer) -> AxialMotion:
     """The motion along the drive that goes with `beads_of`, of one step."""
     first, second = dimer.radii
     contacts = [(first, np.inf), (second, np.inf), (first, second)]
     edges = [edge_resistance(surfaces_of(case, *radii)) for radii in contacts]
-    return _AxialMotion(
+    return AxialMotion(
         sliding=np.zeros((3, 1)),
         normal=np.zeros((3, 1)),
         spin=np.array(AXIAL_SPINS)[:, None],
