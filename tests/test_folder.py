@@ -793,6 +793,8 @@ def interrupted_pile(in_folder: Path) -> Path:
         program.kill()
         program.wait(PATIENCE)
     wait_for(lambda: not engines_in(in_folder))
+    # The worker of the sweep ends a little later than the program that was killed.
+    wait_for(lambda: "running" not in call("list", "piles").stdout)
     (directory,) = in_folder.rglob("*.incomplete")
     return directory
 
