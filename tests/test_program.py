@@ -655,6 +655,12 @@ def test_the_help_loads_no_slow_module(in_folder: Path) -> None:
     assert loaded & SLOW_MODULES == set()
 
 
+@pytest.mark.parametrize("command", ["run", "show", "sweep", "list", "plot", "render", "compare"])
+def test_the_help_of_a_command_loads_what_prints_it(command: str, in_folder: Path) -> None:
+    statement = f"import walkers.main as m; m._status(['{command}', '--help'])"
+    assert loaded_by(statement, in_folder) & SLOW_MODULES == {"cyclopts", "rich"}
+
+
 def test_a_list_loads_few_slow_modules(in_folder: Path) -> None:
     loaded = loaded_by("import walkers.main as m; m._status(['list'])", in_folder)
     assert loaded & SLOW_MODULES == {"cyclopts", "numpy", "pydantic"}

@@ -10,7 +10,6 @@ from cyclopts import Parameter
 
 import walkers
 from walkers import DEFAULT_OUT
-from walkers.api import has_not_begun
 from walkers.commands.options import (
     FormatsOption,
     JsonOption,
@@ -28,7 +27,6 @@ from walkers.commands.options import (
 )
 from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.postprocess.show.film_options import FilmOptions, Seconds
-from walkers.postprocess.show.start import NOTHING_HAS_RUN
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.terminal import table_width
 
@@ -185,6 +183,9 @@ def render(
     film
         Render a film instead of pictures.
     """
+    from walkers.api import has_not_begun
+    from walkers.postprocess.show.start import NOTHING_HAS_RUN
+
     if film:
         refuse("--images", images is not None, "is for pictures, not for --film")
         print(lookup.run(run).film(to, progress=not quiet, **vars(options)))

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 import walkers
-from walkers.api import case_to_run, finished_run_of
 from walkers.commands.options import (
     NOT_NEGATIVE,
     CaseArgument,
@@ -149,6 +148,7 @@ def run(
     verbose
         Print all numbers of the result, and all values that have not been measured.
     """
+    from walkers.api import case_to_run, finished_run_of
     from walkers.sweeps.accuracy import modulus_factors
     from walkers.sweeps.spread import spread_sweep
 
@@ -157,7 +157,16 @@ def run(
     refuse("--json", as_json and dry_run, "is for results, not for --dry-run")
     # Report a mistake in the last file before the first run starts.
     references = [lookup.find(case, quiet=quiet) for case in cases]
-    options = _RunOptions(force, limit, draws, accuracy, engine, as_json, quiet, verbose)
+    options = _RunOptions(
+        force=force,
+        limit=limit,
+        draws=draws,
+        accuracy=accuracy,
+        engine=engine,
+        as_json=as_json,
+        quiet=quiet,
+        verbose=verbose,
+    )
     if dry_run:
         apply_all(lambda reference: _print_plan_of_run(reference, options), references)
         return 0
