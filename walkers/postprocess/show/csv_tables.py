@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from walkers.errors import input_error
-from walkers.files import CSV_SCRATCH, scratch_folder
+from walkers.files import CSV_SCRATCH
 from walkers.postprocess.measure.quantities import TABLES, declared
 from walkers.postprocess.measure.results import read_results
 from walkers.postprocess.measure.table_units import UnitSystem, check_units, in_units, unit_in
 from walkers.postprocess.measure.tables import read_table
+from walkers.postprocess.show.export_folder import files_of_earlier_export, filled_folder
 from walkers.rounding import to_fifteen_digits
 from walkers.text import with_unit
 
@@ -50,24 +50,15 @@ def write_csv(
     """
     check_units(units)
     destination = destination or directory / "csv"
-    earlier_files = _earlier_files(destination)
+    names = {f"{name}.csv" for name in (_RESULT, *TABLES)}
+    earlier_files = files_of_earlier_export(destination, names)
     frames = {_RESULT: _numbers(directory, units)}
     for name in _names_of_tables(directory):
         frame = in_units(read_table(directory, name), units)
         frames[name] = frame.rename(columns=_heads(frame))
-    place = destination.absolute()
-    place.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        with scratch_folder(place.parent, CSV_SCRATCH) as new:
-            for name, frame in frames.items():
-                frame.to_csv(new / f"{name}.csv", index=False)
-            for path in earlier_files:
-                path.unlink()
-            new.rename(place)  # refused by the system if the folder is not empty
-    except OSError as error:
-        # If a disk is full, the error does not name the file.
-        error.filename = error.filename or str(destination)
-        raise
+    with filled_folder(destination, earlier_files, CSV_SCRATCH) as new:
+        for name, frame in frames.items():
+            frame.to_csv(new / f"{name}.csv", index=False)
     return destination
 
 
@@ -94,20 +85,3 @@ def _numbers(directory: Path, units: UnitSystem) -> pd.DataFrame:
             number = to_fifteen_digits(factor * value)
         rows.append([name, number, unit, quantity.meaning])
     return pd.DataFrame(rows, columns=["number", "value", "unit", "meaning"])
-
-
-def _earlier_files(place: Path) -> list[Path]:
-    """Files of an earlier export in a folder; `InputError` if there is anything else."""
-    expected = "expected a new or empty folder, or a folder that walkers export has written"
-    if place.is_symlink():
-        raise input_error(place, f"{expected}; it is a symbolic link")
-    if place.is_file():
-        raise input_error(place, f"{expected}; it is a file")
-    if not place.is_dir():
-        return []
-    names = {f"{name}.csv" for name in (_RESULT, *TABLES)}
-    files = sorted(place.iterdir())
-    for path in files:
-        if path.name not in names:
-            raise input_error(place, f"{expected}; it holds {path.name}")
-    return files

@@ -17,12 +17,13 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from walkers.errors import check_limits, input_error
-from walkers.files import VTK_SCRATCH, scratch_folder
+from walkers.errors import check_limits
+from walkers.files import VTK_SCRATCH
 from walkers.postprocess.measure import piles
 from walkers.postprocess.measure.clusters import connected
 from walkers.postprocess.measure.motion import Bridges, Motion, read_bridges, read_motion
 from walkers.postprocess.show.camera import CAMERA_DISTANCE, camera_axes
+from walkers.postprocess.show.export_folder import files_of_earlier_export, filled_folder
 from walkers.postprocess.show.meshes import mesh_of, walls_of
 from walkers.postprocess.show.necks import bridge_ends
 from walkers.postprocess.show.scene import Scene, gathered
@@ -83,40 +84,13 @@ def write_vtk(
     """
     check_limits("every", every, 1, whole=True)
     destination = destination or directory / "vtk"
-    earlier_files = _earlier_files(destination)
+    earlier_files = files_of_earlier_export(destination, _names_of_export(destination))
     motion = read_motion(directory)
     if motion.case.boundary.is_open_floor:
         motion = gathered(motion)
-    place = destination.absolute()
-    place.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        with scratch_folder(place.parent, VTK_SCRATCH) as new:
-            _write_files(new, motion, every or motion.case.run.samples_per_cycle)
-            for path in earlier_files:
-                path.unlink()
-            new.rename(place)  # refused by the system if the folder is not empty
-    except OSError as error:
-        # If a disk is full, the error does not name the file.
-        error.filename = error.filename or str(destination)
-        raise
+    with filled_folder(destination, earlier_files, VTK_SCRATCH) as new:
+        _write_files(new, motion, every or motion.case.run.samples_per_cycle)
     return destination / _COLLECTION
-
-
-def _earlier_files(place: Path) -> list[Path]:
-    """Files of an earlier export in a folder; `InputError` if there is anything else."""
-    expected = "expected a new or empty folder, or a folder that walkers export has written"
-    if place.is_symlink():
-        raise input_error(place, f"{expected}; it is a symbolic link")
-    if place.is_file():
-        raise input_error(place, f"{expected}; it is a file")
-    if not place.is_dir():
-        return []
-    files = list(place.iterdir())
-    names = {path.name for path in files}
-    foreign = sorted(names - _names_of_export(place))
-    if foreign:
-        raise input_error(place, f"{expected}; it holds {foreign[0]}")
-    return files
 
 
 def _names_of_export(folder: Path) -> set[str]:
