@@ -14,7 +14,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from walkers.api import Run, Sweep, calibrate, climb, compare, load, predict, run, sweep
+    from walkers.api import (
+        Run,
+        Sweep,
+        calibrate,
+        climb,
+        compare,
+        draw_start,
+        load,
+        predict,
+        run,
+        sweep,
+    )
     from walkers.calibration.calibrate import CalibrationStopped
     from walkers.errors import InputError, InputErrors, WalkersError
     from walkers.extras import ExtraMissing

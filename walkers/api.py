@@ -509,9 +509,7 @@ class Run:
             If the file is not a PNG, or the run has no such walker.
         """
         with self._pictured() as (directory, folder):
-            place = _path(to)
-            if place is None and folder is not None:
-                place = folder / SERIES_NAME
+            place = _path_or(to, folder, SERIES_NAME)
             return Pictures(render_series(directory, place, images=images, walker=walker))
 
     def film(
@@ -607,9 +605,7 @@ class Run:
         'fig1b.html'
         """
         with self._pictured() as (directory, folder):
-            place = _path(to)
-            if place is None and folder is not None:
-                place = folder / REPORT_NAME
+            place = _path_or(to, folder, REPORT_NAME)
             figures = figures_of_spread(directory)
             return report_run(directory, place, self.origins, figures=figures)
 
@@ -804,6 +800,14 @@ def _path(to: str | Path | None) -> Path | None:
         return None
     check_is_path("to", to)
     return Path(to)
+
+
+def _path_or(to: str | Path | None, folder: Path | None, name: str) -> Path | None:
+    """The path of an argument ``to``, or else a file of a folder, if there is a folder."""
+    place = _path(to)
+    if place is None and folder is not None:
+        return folder / name
+    return place
 
 
 def run(
@@ -1146,8 +1150,9 @@ class Sweep:
         check_place(place, *(f".{form}" for form in FORMATS))
         runs = [Path(run).name for run in table.finished["run"]]
         form = place.suffix.lower()[1:]
-        title = str(table.frame.attrs["sweep"])
-        return Pictures(save_figure(_figure(table, options), place, runs, form, title))
+        figure = _figure(table, options)
+        sweep_name = str(table.frame.attrs["sweep"])
+        return Pictures(save_figure(figure, place, runs, form, sweep_name))
 
     def report(self, to: str | Path | None = None) -> Path:
         """Write a self-contained HTML report.

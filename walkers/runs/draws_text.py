@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from walkers.postprocess.measure.quantities import unit_shown
 from walkers.postprocess.measure.uncertainty import few_draws
 from walkers.rounding import percent, rounded
-from walkers.runs.draws import Band, ComparedDraws
+from walkers.runs.draws import Band, ComparedDraws, PairsOfDraws
 from walkers.terminal import table_width, wrapped
 from walkers.text import aligned_blocks, with_unit
 
@@ -46,25 +46,16 @@ def rows_of(compared: ComparedDraws) -> list[list[str]]:
     if compared.common is not None:
         pairs = compared.common
         larger = round(pairs.second_larger * pairs.pairs)
-        rows.append(
-            [
-                "common",
-                band_text(pairs.difference, compared.unit),
-                band_text(pairs.ratio, ""),
-                f"{larger} of {pairs.pairs} pairs",
-            ]
-        )
+        rows.append(["common", *_bands(pairs, compared.unit), f"{larger} of {pairs.pairs} pairs"])
     pairs = compared.independent
     share = float(f"{pairs.second_larger:.2g}")
-    rows.append(
-        [
-            "independent",
-            band_text(pairs.difference, compared.unit),
-            band_text(pairs.ratio, ""),
-            f"{percent(share)} of pairs",
-        ]
-    )
+    rows.append(["independent", *_bands(pairs, compared.unit), f"{percent(share)} of pairs"])
     return rows
+
+
+def _bands(pairs: PairsOfDraws, unit: str) -> list[str]:
+    """The bands of difference (in this SI unit) and ratio as text."""
+    return [band_text(pairs.difference, unit), band_text(pairs.ratio, "")]
 
 
 def band_text(band: Band | None, unit: str) -> str:

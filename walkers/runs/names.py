@@ -127,20 +127,26 @@ class Reference:
 
         Empty if there are no changes, or if there is no case that can be read.
         """
-        document: Mapping[str, Any] = {}
-        given = self.given
-        with suppress(InputError):  # told when the case is used
-            if not self.changes:
-                pass
-            elif isinstance(given, Case):
-                document = given.document
-            elif isinstance(given, Mapping):
-                document = given
-            elif self.kind == "run":
-                document = readable_case(self.path).document
-            elif self.kind == "case":
-                document = read_toml(find_input(given, "case"))
+        if not self.changes:
+            return {}
+        try:
+            document = self._document
+        except InputError:  # told when the case is used
+            return {}
         return replaced_keys(CaseFile, document, self.changes)
+
+    @property
+    def _document(self) -> Mapping[str, Any]:
+        """The tables of the case without the changes; empty if the name is not that of a case."""
+        if isinstance(self.given, Case):
+            return self.given.document
+        if isinstance(self.given, Mapping):
+            return self.given
+        if self.kind == "run":
+            return readable_case(self.path).document
+        if self.kind == "case":
+            return read_toml(find_input(self.given, "case"))
+        return {}
 
     @cached_property
     def finished_run(self) -> Path | None:

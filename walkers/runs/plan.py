@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from walkers.inputs.tables.case import Case
 from walkers.rounding import duration_text
@@ -46,15 +45,6 @@ class RunPlan:
     status: str
     result: str
     seconds: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain JSON types, SI units."""
-        return {
-            "case": self.case.name,
-            "directory": str(self.directory),
-            "status": self.status,
-            "predicted_seconds": self.seconds,
-        }
 
     def as_text(self) -> str:
         """The plan in a few lines."""

@@ -116,9 +116,8 @@ def _abandoned_exports(out: Path, runs: Sequence[ListEntry]) -> list[Path]:
         parents.insert(0, out)
     exports = []
     for parent in parents:
-        exports += abandoned(parent, VTK_SCRATCH)
-        exports += abandoned(parent, CSV_SCRATCH)
-        exports += abandoned(parent, SO_FAR_SCRATCH)
+        for prefix in (VTK_SCRATCH, CSV_SCRATCH, SO_FAR_SCRATCH):
+            exports += abandoned(parent, prefix)
     return exports
 
 

@@ -27,7 +27,7 @@ def complete_part(place: Path, status: str) -> Iterator[Path]:
     Parameters
     ----------
     place
-        The final directory of the run.
+        The final directory of the run, which has several segments.
     status
         Status of the run, for its title.
 
@@ -39,7 +39,7 @@ def complete_part(place: Path, status: str) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If the run has a single segment, or no segment of the drive is complete yet.
+        If no segment of the drive is complete yet.
 
     Warns
     -----
@@ -50,7 +50,7 @@ def complete_part(place: Path, status: str) -> Iterator[Path]:
     case = run_directory.case_of(incomplete)
     segments = run_directory.segment_directories(incomplete)
     settling = _settling_segments(segments)
-    if settling is None or case.run.has_one_segment:
+    if settling is None:
         message = f"the run is {status}, and no segment of its drive is complete yet"
         raise input_error(place, message)
     total = settling + ceil(case.run.cycles / case.run.cycles_per_segment)

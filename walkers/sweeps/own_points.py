@@ -110,12 +110,20 @@ class PointsFile:
         y
             What is on their y axis.
         """
-        x_heads = [head for x in x_factors if (head := self._head_of(x, "x"))]
+        heads: list[str] = []
+        for x in x_factors:
+            x_head = self._head_of(x, "x")
+            if x_head is not None:
+                heads.append(x_head)
         y_head = self._head_of(y, "y")
-        if not x_heads or y_head is None:
+        if not heads or y_head is None:
             raise self._missing(x_factors, y)
-        drawn: list[str | None] = [*x_heads, y_head]
-        drawn += [self._error_head(_name_and_unit(head)[0]) for head in [*x_heads, y_head]]
+        heads.append(y_head)
+        error_heads = []
+        for head in heads:
+            name, _ = _name_and_unit(head)
+            error_heads.append(self._error_head(name))
+        drawn = {*heads, *error_heads}
         left_out = [f'"{head}"' for head in self.columns if head not in drawn]
         if left_out:
             warn_left_out(f"{self.path}: not drawn: {', '.join(left_out)}")

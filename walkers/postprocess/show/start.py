@@ -255,16 +255,22 @@ def _figure(motion: Motion, heading: Sequence[str]) -> Figure:
     right, top, _ = scene.high.tolist()
     panel.imshow(picture, extent=(left, right, bottom, top), interpolation="antialiased")
     panel.set_axis_off()
-    for wall in named[:_MOST_NAMED]:
-        x, y, _ = 1e3 * wall.middle @ scene.axes.T
-        colour = "black" if wall.normal @ toward >= 0.0 else _FRONT_COLOUR
-        paper = {"facecolor": "white", "alpha": 0.6, "linewidth": 0.0, "pad": 1.0}
-        style: dict[str, Any] = {**_TEXT, "color": colour, "bbox": paper}
-        panel.text(x, y, wall.name, **style)
+    _draw_names(panel, scene, named[:_MOST_NAMED])
     _draw_axes(panel, scene)
     _draw_drive(panel, scene)
     _draw_scale(panel, scene)
     return figure
+
+
+def _draw_names(panel: Axes, scene: Scene, named: Sequence[NamedWall]) -> None:
+    """Write the name of each wall in its middle; grey for walls in front."""
+    toward = scene.axes[2]
+    paper = {"facecolor": "white", "alpha": 0.6, "linewidth": 0.0, "pad": 1.0}
+    for wall in named:
+        x, y, _ = 1e3 * wall.middle @ scene.axes.T
+        colour = "black" if wall.normal @ toward >= 0.0 else _FRONT_COLOUR
+        style: dict[str, Any] = {**_TEXT, "color": colour, "bbox": paper}
+        panel.text(x, y, wall.name, **style)
 
 
 def _draw_axes(panel: Axes, scene: Scene) -> None:
