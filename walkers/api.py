@@ -22,8 +22,8 @@ from walkers.errors import (
     InputError,
     Problem,
     apply_all,
-    check_is_path,
     check_limits,
+    check_text_or_path,
     check_utf8,
     expected_of,
     input_error,
@@ -798,7 +798,7 @@ def _path(to: str | Path | None) -> Path | None:
     """The path of an argument ``to``; raises `InputError` if it is neither text nor a path."""
     if to is None:
         return None
-    check_is_path("to", to)
+    check_text_or_path("to", to)
     return Path(to)
 
 
@@ -1295,13 +1295,13 @@ def sweep(
     >>> walkers.sweep("fig4", tmp).table()[["liquid.name", "status"]].to_dict("list")
     {'liquid.name': ['Si AK5', 'Si AK10'], 'status': ['finished', 'finished']}
     """
-    check_is_path("out", out)
+    check_text_or_path("out", out)
     check_limits("jobs", jobs, 1, whole=True)
     check_limits("time_limit", time_limit, 0.0)
     if spread != 0:
         check_number_of_draws(spread, "spread")
     if site is not None:
-        check_is_path("site", site)
+        check_text_or_path("site", site)
     points = load_sweep(sweep, changes)
     options = SweepOptions(jobs, load_site(Path(site)) if site else None, executor, time_limit)
     folder = Path(out).resolve() if site else Path(out)
@@ -1566,7 +1566,7 @@ def calibrate(
     from walkers.calibration import calibrate
     from walkers.calibration.file import load_calibration
 
-    check_is_path("out", out)
+    check_text_or_path("out", out)
     check_limits("jobs", jobs, 1, whole=True)
     return calibrate.calibrate(
         load_calibration(calibration),

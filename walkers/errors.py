@@ -236,7 +236,7 @@ def check_limits(
     raise input_error(name, f"{number:g}: expected {limits}")
 
 
-def check_is_path(name: str, value: object, expectation: str = "a path") -> None:
+def check_text_or_path(name: str, value: object, expectation: str = "a path") -> None:
     """Raise `InputError` if an argument is neither text nor a path.
 
     Parameters

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from walkers.errors import check_is_path, check_utf8, expected_of, input_error
+from walkers.errors import check_text_or_path, check_utf8, expected_of, input_error
 from walkers.files import write_json
 from walkers.inputs.reading import shipped
 
@@ -35,7 +35,7 @@ def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[
     InputError
         If the file exists already or cannot be written, or if there is no such shipped case.
     """
-    check_is_path("path", path)
+    check_text_or_path("path", path)
     path = Path(path)
     check_utf8(path)
     if path.name in ("", "..") or path.stem in (".", ".."):

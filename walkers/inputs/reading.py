@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from walkers.errors import (
     InputError,
     check_changes,
-    check_is_path,
+    check_text_or_path,
     check_utf8,
     input_error,
     key_error,
@@ -227,7 +227,7 @@ def find_input(name: str | Path, kind: str) -> Path:
     InputError
         If there is no such file, or it is of another kind. The message suggests names or commands.
     """
-    check_is_path(kind, name, f"a {kind}: its file, name or tables")
+    check_text_or_path(kind, name, f"a {kind}: its file, name or tables")
     check_utf8(name)
     text = str(name)
     path = Path(name)

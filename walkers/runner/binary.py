@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from walkers.errors import check_is_path
+from walkers.errors import check_text_or_path
 from walkers.files import checksum
 from walkers.runner.failures import AUDITED_VERSION, EngineMissing, OtherEngine
 from walkers.runner.model_sources import forces_version_line
@@ -60,7 +60,7 @@ def find_engine(name_or_path: str | None = None) -> Engine:
         If the name is not text.
     """
     if name_or_path is not None:
-        check_is_path("engine", name_or_path, "the name or path of a liggghts binary")
+        check_text_or_path("engine", name_or_path, "the name or path of a liggghts binary")
     name = name_or_path or os.environ.get(ENGINE_VARIABLE) or "liggghts"
     executable = shutil.which(name)
     if executable is None:

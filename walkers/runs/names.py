@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from walkers import DEFAULT_OUT, RECORDS
-from walkers.errors import InputError, WalkersError, check_changes, check_is_path, input_error
+from walkers.errors import InputError, WalkersError, check_changes, check_text_or_path, input_error
 from walkers.inputs.case_building import changed_case
 from walkers.inputs.config_table import replaced_keys
 from walkers.inputs.reading import find_input, is_sweep_file, load_case, shipped
@@ -190,8 +190,8 @@ def find(
     if isinstance(given, Reference):
         return given
     if not isinstance(given, (Case, Mapping)):
-        check_is_path("case", given, "a case, its file, name or tables, or a run")
-    check_is_path("out", out)
+        check_text_or_path("case", given, "a case, its file, name or tables, or a run")
+    check_text_or_path("out", out)
     check_changes(changes)
     kind: NameKind = "case"
     path = Path(out)

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from walkers.errors import check_is_path
+from walkers.errors import check_text_or_path
 
 Log = Literal["x", "y", "xy"]
 """Letters of logarithmic axes."""
@@ -68,9 +68,9 @@ class FigureOptions:
         names = {"x": self.x, "y": self.y, "hue": self.hue, "panels": self.panels}
         for argument, name in names.items():
             if name is not None:
-                check_is_path(argument, name, "the name of a key or a column")
+                check_text_or_path(argument, name, "the name of a key or a column")
         files = self.data_files
         for file in files if isinstance(files, (list, tuple)) else [files]:
-            check_is_path("data_files", file, "a file, or LABEL=FILE")
+            check_text_or_path("data_files", file, "a file, or LABEL=FILE")
         if self.width is not None:
-            check_is_path("width", self.width, "a width, such as 85mm")
+            check_text_or_path("width", self.width, "a width, such as 85mm")
