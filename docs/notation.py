@@ -28,8 +28,11 @@ _ANGLE = 28.0
 """Angle ψ between the walker and the drive axis, degrees."""
 _TILT = 20.0
 """Tilt of the substrate, degrees."""
-_BEADS = ("#b3392f", "#d98c3f")
-"""Colours of the large and the small bead, as in `docs.why_it_walks`."""
+LARGE_BEAD = "#b3392f"
+"""Colour of the large bead."""
+SMALL_BEAD = "#d98c3f"
+"""Colour of the small bead."""
+_BEADS = (LARGE_BEAD, SMALL_BEAD)
 _LIQUID = "#7fb2dc"
 _GROUND = "0.82"
 _MOTION = "#1f4e8c"

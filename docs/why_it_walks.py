@@ -11,8 +11,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from docs.notation import LARGE_BEAD, SMALL_BEAD
 from walkers import Run, load_case
 from walkers import run as walk
+from walkers.arrays import FloatArray
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.tables.case import Case
 from walkers.physics.dimer import Dimer
@@ -32,12 +34,17 @@ _LENGTH_OF_LOAD = 0.5 / 70e-6
 """Length of an arrow over the force that it shows, mm/N."""
 _DELAY = 0.25
 """The drive of the theory begins a quarter of a cycle later than that of the engine."""
-_LARGE = "#b3392f"
-_SMALL = "#d98c3f"
-
-
+_LOAD_COLOUR = "#2c5aa0"
+"""Colour of loads, and of what happens between the beads."""
+_FRICTION_COLOUR = LARGE_BEAD
+_LEAST_VELOCITY = 2.0
+"""Velocity above which a sketch has arrows of the motion, mm/s."""
 SHOWN = "fig1b"
 """The case that the figure shows."""
+WITHOUT_FRICTION: dict[str, float] = {"contact.friction.bead_bead": 0.0}
+"""Changes of the case that take the friction between the beads away."""
+WITHOUT_VISCOSITY: dict[str, float] = {"liquid.viscosity_ratio": 0.0}
+"""Changes of the case that take the viscous forces of the bridges away."""
 
 
 def shown_case() -> Case:
@@ -60,10 +67,21 @@ def cycle() -> AxialMotion:
     return motion
 
 
-WITHOUT_FRICTION: dict[str, float] = {"contact.friction.bead_bead": 0.0}
-"""Changes of the case that take the friction between the beads away."""
-WITHOUT_VISCOSITY: dict[str, float] = {"liquid.viscosity_ratio": 0.0}
-"""Changes of the case that take the viscous forces of the bridges away."""
+def _fastest(motion: AxialMotion) -> dict[str, int]:
+    """The steps in which the walker is fastest, ``ahead`` and ``back``."""
+    return {"ahead": int(np.argmax(motion.velocity)), "back": int(np.argmin(motion.velocity))}
+
+
+def _times(motion: AxialMotion) -> FloatArray:
+    """The middle of each step, cycles."""
+    steps = len(motion.velocity)
+    return (np.arange(steps) + 0.5) / steps
+
+
+def _friction(case: Case, motion: AxialMotion) -> FloatArray:
+    """The friction between the beads in each step, N."""
+    coefficient = case.contact.friction.between_beads.coefficient(np.abs(motion.sliding[2]))
+    return np.asarray(coefficient * motion.normal[2])
 
 
 def numbers(out: Path) -> dict[str, float]:
@@ -74,18 +92,14 @@ def numbers(out: Path) -> dict[str, float]:
     out
         Folder with runs; missing ones are made.
     """
-    case = shown_case()
     motion = cycle()
+    friction = _friction(shown_case(), motion)
     values: dict[str, float] = {}
-    moments = {"ahead": int(np.argmax(motion.velocity)), "back": int(np.argmin(motion.velocity))}
-    for direction, step in moments.items():
-        sliding = float(motion.sliding[2, step])
-        coefficient = case.contact.friction.between_beads.coefficient(abs(sliding))
-        load = float(motion.normal[2, step])
+    for direction, step in _fastest(motion).items():
         values[f"{direction}_speed"] = 1e3 * abs(float(motion.velocity[step]))
-        values[f"{direction}_sliding_speed"] = 1e3 * abs(sliding)
-        values[f"{direction}_load"] = 1e6 * load
-        values[f"{direction}_friction"] = 1e6 * float(coefficient) * load
+        values[f"{direction}_sliding_speed"] = 1e3 * abs(float(motion.sliding[2, step]))
+        values[f"{direction}_load"] = 1e6 * float(motion.normal[2, step])
+        values[f"{direction}_friction"] = 1e6 * float(friction[step])
     values["mean_velocity"] = 1e3 * float(motion.velocity.mean())
     for name, changes in (("frictionless", WITHOUT_FRICTION), ("inviscid", WITHOUT_VISCOSITY)):
         values[name] = 1e3 * float(walk(load_case(SHOWN, changes), out).result["velocity"])
@@ -103,11 +117,9 @@ def figure(run: Run) -> Figure:
     """
     case = shown_case()
     motion = cycle()
-    fastest_back = int(np.argmin(motion.velocity))
-    fastest_ahead = int(np.argmax(motion.velocity))
     steps = len(motion.velocity)
-    rests = np.flatnonzero(np.diff(np.sign(motion.velocity)))
-    moments = sorted([fastest_back, fastest_ahead, *rests.tolist()[:2]])
+    turns = np.flatnonzero(np.diff(np.sign(motion.velocity))).tolist()
+    moments = sorted([*_fastest(motion).values(), *turns[:2]])
     drawn = new_figure(TWO_COLUMNS, 4.2)
     grid = drawn.add_gridspec(2, 4, height_ratios=(1.0, 1.6))
     sketches = [drawn.add_subplot(grid[0, column]) for column in range(4)]
@@ -128,16 +140,19 @@ def figure(run: Run) -> Figure:
 
 def _sketch(axes: Axes, dimer: Dimer, motion: AxialMotion, step: int) -> None:
     """Draw the beads, how they move, and the loads of the three contacts at a moment."""
-    large, small = (1e3 * radius for radius in dimer.radii)
+    large = 1e3 * dimer.radii[0]
+    small = 1e3 * dimer.radii[1]
     distance = 2.0 * np.sqrt(large * small)
     centres = np.array([[distance, large], [0.0, small]])
-    for centre, radius, colour in zip(centres, (large, small), (_LARGE, _SMALL), strict=True):
+    for centre, radius, colour in zip(
+        centres, (large, small), (LARGE_BEAD, SMALL_BEAD), strict=True
+    ):
         axes.add_patch(
             Circle(tuple(centre), radius, facecolor=colour, alpha=0.35, edgecolor=colour)
         )
     axes.axhline(0.0, color="0.3", lw=1.5)
     velocity = 1e3 * float(motion.velocity[step])
-    if abs(velocity) > 2.0:
+    if abs(velocity) > _LEAST_VELOCITY:
         start = 0.5 * distance - 0.012 * velocity
         axes.annotate(
             "",
@@ -177,30 +192,28 @@ def _draw_load(axes: Axes, point: np.ndarray, direction: np.ndarray, length: flo
         "",
         xy=tuple(point + length * direction),
         xytext=tuple(point),
-        arrowprops={"arrowstyle": "-|>", "color": "#2c5aa0", "lw": 1.8},
+        arrowprops={"arrowstyle": "-|>", "color": _LOAD_COLOUR, "lw": 1.8},
     )
 
 
 def _draw_velocity(axes: Axes, motion: AxialMotion, run: Run) -> None:
     """Draw the velocity of the walker, and that at which the beads slide on each other."""
-    time = (np.arange(len(motion.velocity)) + 0.5) / len(motion.velocity)
-    sliding_colour = "#2c5aa0"
+    time = _times(motion)
     axes.plot(time, 1e3 * motion.velocity, color="k", label="walker, theory")
-    axes.plot(time, 1e3 * motion.sliding[2], color=sliding_colour, label="bead on bead, theory")
+    axes.plot(time, 1e3 * motion.sliding[2], color=_LOAD_COLOUR, label="bead on bead, theory")
     recorded = run.motion
     walker = gait(recorded.groups[0])
     last_cycle = slice(-int(recorded.case.run.samples_per_cycle) - 1, -1)
     phase = (recorded.time[last_cycle] * recorded.case.excitation.frequency + _DELAY) % 1.0
     axes.plot(phase, 1e3 * walker.velocity[last_cycle, 0], "o", color="k", ms=3, label="engine")
-    axes.plot(phase, 1e3 * walker.sliding[last_cycle, 0, 2], "o", color=sliding_colour, ms=3)
+    axes.plot(phase, 1e3 * walker.sliding[last_cycle, 0, 2], "o", color=_LOAD_COLOUR, ms=3)
     axes.axhline(1e3 * motion.velocity.mean(), color="k", ls=":", label="mean of the walker")
     axes.set(ylabel="velocity (mm/s)", title="walker and surfaces", ylim=(-45.0, 85.0))
 
 
 def _draw_loads(axes: Axes, case: Case, motion: AxialMotion) -> None:
     """Draw the load and the friction of the contact between the beads."""
-    time = (np.arange(len(motion.velocity)) + 0.5) / len(motion.velocity)
-    coefficient = case.contact.friction.between_beads.coefficient(np.abs(motion.sliding[2]))
-    axes.plot(time, 1e6 * motion.normal[2], color="#2c5aa0", label="load")
-    axes.plot(time, 1e6 * coefficient * motion.normal[2], color=_LARGE, label="friction")
+    time = _times(motion)
+    axes.plot(time, 1e6 * motion.normal[2], color=_LOAD_COLOUR, label="load")
+    axes.plot(time, 1e6 * _friction(case, motion), color=_FRICTION_COLOUR, label="friction")
     axes.set(ylabel="force (µN)", title="between the beads", ylim=(0.0, None))
