@@ -376,6 +376,14 @@ def test_a_dry_run_writes_nothing_and_says_what_is_missing(in_folder: Path) -> N
     assert not list(in_folder.iterdir())
 
 
+def test_a_dry_run_prints_the_notes_of_cases_that_would_be_run(in_folder: Path) -> None:
+    unit = "drive.frequency=80 kHz"
+    planned = call("run", "fig1b", "--dry-run", "--set", unit, check=True)
+    assert re.search(r"^walkers: fig1b: .*80 kHz", planned.stderr, re.MULTILINE), planned.stderr
+    assert call("run", "fig1b", "--dry-run", "-q", "--set", unit, check=True).stderr == ""
+    assert call("run", "fig1b", "--dry-run", check=True).stderr == ""
+
+
 def test_a_dry_run_knows_a_finished_run_and_its_draws(folder: Path) -> None:
     options = ["--dry-run", "--spread", "--points", "2"]
     planned = call("run", "mine.toml", *options, check=True, folder=folder).stdout

@@ -196,12 +196,11 @@ def _run_one(
 ) -> bool:
     """Run a case unless its run is finished, and print the result; return whether a run failed."""
     from walkers.runner.failures import EngineFailure
-    from walkers.runs.preview import notes
 
     is_told = not options.quiet
     engine = options.engine
     if finished_run is None and is_told:
-        tell(*[f"{case.name}: {note}" for note in notes(case)])
+        _tell_notes(case)
     try:
         done = finished_run or walkers.run(
             case,
@@ -221,6 +220,13 @@ def _run_one(
         band = done.spread(options.draws, progress=is_told, engine=engine)
     _print_run(done, band, options)
     return band is not None and bool(band.failures)
+
+
+def _tell_notes(case: Case) -> None:
+    """Print what a user should know about a case before it is run."""
+    from walkers.runs.preview import notes
+
+    tell(*[f"{case.name}: {note}" for note in notes(case)])
 
 
 def _print_run(run: walkers.Run, band: Spread | None, options: _RunOptions) -> None:
@@ -248,6 +254,8 @@ def _print_plan_of_run(reference: Reference, options: _RunOptions) -> None:
     from walkers.sweeps.spread import plan_spread
 
     plan = plan_run(reference, options.engine, force=options.force)
+    if plan.is_run and not options.quiet:
+        _tell_notes(plan.case)
     print(plan.as_text())
     folder = plan.directory.parent
     further = {}

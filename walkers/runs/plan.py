@@ -69,6 +69,11 @@ class RunPlan:
         )
 
     @property
+    def is_run(self) -> bool:
+        """Whether the engine would be started."""
+        return self.status not in ("finished", "running")
+
+    @property
     def _task(self) -> str:
         """What would be done, with the predicted time."""
         if self.status == "finished":
