@@ -391,6 +391,12 @@ def test_a_dry_run_knows_a_finished_run_and_its_draws(folder: Path) -> None:
     assert "spread     0 more runs" in planned
 
 
+def test_a_forced_dry_run_says_that_the_finished_run_is_made_again(folder: Path) -> None:
+    planned = call("run", "mine.toml", "--dry-run", "--force", check=True, folder=folder).stdout
+    assert re.search(r"status     finished, [\d.]+ mm/s\n", planned)
+    assert re.search(r"to do      run again and replace the result, predicted \d+ s\n", planned)
+
+
 def test_a_dry_run_says_how_much_of_a_run_is_left(in_folder: Path) -> None:
     Path("slow.toml").write_text(_toml(document(run={**SHORT, "cycles": 4000})))
     assert call("run", "slow.toml", "--limit", "0.01").returncode == 1
