@@ -19,7 +19,7 @@ from walkers.postprocess.measure.uncertainty import spread_of
 from walkers.runs.draws import Band, ComparedDraws, Draws, Unknown, compare_draws
 from walkers.runs.draws_text import compared_draws_text
 from walkers.sweeps.spread import draws_of
-from walkers.sweeps.table import load_table
+from walkers.sweeps.table import cells_of, load_table
 
 FRICTION = "contact.friction.bead_wall"
 RESTITUTION = "contact.restitution"
@@ -264,6 +264,16 @@ def test_a_sweep_needs_two_points_with_a_spread(both_points: list[Path], copied_
     (spread_of(runs / both_points[1].name) / "spread.json").unlink()
     with pytest.raises(InputError, match="expected a spread of the first point and of another"):
         walkers.compare("fast", out=runs)
+
+
+def test_a_band_of_one_point_alone_has_a_column(both_points: list[Path], copied_runs: Path) -> None:
+    shutil.rmtree(spread_of(copied_runs / both_points[1].name))
+    frame = load_table(copied_runs / "fast")
+    cells, same = cells_of(frame)
+    with_band, without = cells["velocity_low (mm/s)"].tolist()
+    assert float(with_band) == pytest.approx(1e3 * frame["velocity_low"][0], rel=1e-2)
+    assert without == "-"
+    assert "velocity_" not in same
 
 
 def test_a_damaged_spread_counts_as_none(both_points: list[Path], copied_runs: Path) -> None:
