@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.collections import LineCollection
 
 import walkers
 from tests.conftest import ESCAPE, TINY, FillOnce, call, document, on_terminal, to_toml
@@ -274,6 +275,29 @@ def test_a_band_of_one_point_alone_has_a_column(both_points: list[Path], copied_
     assert float(with_band) == pytest.approx(1e3 * frame["velocity_low"][0], rel=1e-2)
     assert without == "-"
     assert "velocity_" not in same
+
+
+def test_a_band_between_points_without_one_is_drawn_as_a_bar(
+    both_points: list[Path], copied_runs: Path
+) -> None:
+    sweep = walkers.Sweep(copied_runs / "fast")
+    assert bars_of(sweep) == []  # the band joins both points
+    shutil.rmtree(spread_of(copied_runs / both_points[1].name))
+    low, high = sweep.refresh().table().loc[0, ["velocity_low", "velocity_high"]]
+    ((place, *ends),) = bars_of(sweep)
+    assert place == 3.0  # g, of the first point
+    assert ends == pytest.approx([1e3 * low, 1e3 * high])
+
+
+def bars_of(sweep: walkers.Sweep) -> list[list[float]]:
+    """Place, lower and upper end of the bars in the only panel of the figure of a sweep."""
+    (axes,) = sweep.figure().axes
+    bars = []
+    for lines in axes.collections:
+        if isinstance(lines, LineCollection) and lines.get_linewidth()[0] == 4.0:
+            for (place, low), (_, high) in lines.get_segments():
+                bars.append([place, low, high])
+    return bars
 
 
 def test_a_damaged_spread_counts_as_none(both_points: list[Path], copied_runs: Path) -> None:
