@@ -39,8 +39,9 @@ from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.runner.run_directory import case_of, locked
 from walkers.runs.case_text import readable
 from walkers.runs.comparison import ComparedRun, Comparison, compare_runs
-from walkers.runs.listing import bytes_text, size_and_last_change
+from walkers.runs.listing import ListEntry, bytes_text, size_and_last_change
 from walkers.runs.removal import Removal, remove, unfinished_in
+from walkers.sweeps.listing import without_draws, without_members
 from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.removal import removals_in
 from walkers.sweeps.scheduler import SweepOptions, plan_sweep
@@ -254,6 +255,25 @@ def test_list_refuses_a_condition_that_no_run_can_meet(
     ended = _list_where([condition])
     assert ended.returncode == 2
     assert message in ended.stderr
+
+
+def test_draws_of_an_earlier_number_of_points_are_hidden_with_those_of_the_last() -> None:
+    def run(name: str) -> ListEntry:
+        return ListEntry(kind="run", name=name, case="a", status="finished", directory=Path(name))
+
+    old = run("a-0-spread/a-1")
+    new = run("a-0-spread/a-2")
+    asked_for = run("a-0")
+    spread = ListEntry(
+        kind="sweep",
+        name="a-0-spread",
+        case="a",
+        status="finished",
+        directory=Path("a-0-spread"),
+        runs=[new.name],
+    )
+    assert without_members([spread, asked_for, old, new]) == [spread, asked_for]
+    assert without_draws([spread, asked_for, old, new]) == [spread, asked_for]
 
 
 def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
