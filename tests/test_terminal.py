@@ -384,6 +384,16 @@ def test_a_dry_run_prints_the_notes_of_cases_that_would_be_run(in_folder: Path) 
     assert call("run", "fig1b", "--dry-run", check=True).stderr == ""
 
 
+def test_fewer_draws_tell_that_they_replace_the_band_of_more(folder: Path, tmp_path: Path) -> None:
+    runs = shutil.copytree(folder / "runs", tmp_path / "runs")
+    options = ["mine.toml", "--runs", str(runs), "--spread", "--points"]
+    more = call("run", *options, "3", check=True, folder=folder)
+    assert "replaces" not in more.stderr
+    fewer = call("run", *options, "2", check=True, folder=folder)
+    replaced = "mine: the band of 2 draws replaces that of 3 draws, which are kept"
+    assert replaced in fewer.stderr.replace("\n", " ")
+
+
 def test_a_dry_run_knows_a_finished_run_and_its_draws(folder: Path) -> None:
     options = ["--dry-run", "--spread", "--points", "2"]
     planned = call("run", "mine.toml", *options, check=True, folder=folder).stdout
