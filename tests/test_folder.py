@@ -37,9 +37,9 @@ from walkers.postprocess.measure.uncertainty import ACCURACY_NAME, SPREAD_NAME, 
 from walkers.progress import Progress
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.runner.run_directory import case_of, locked
-from walkers.runs.case_text import readable
+from walkers.runs.case_text import FlatCase, readable
 from walkers.runs.comparison import ComparedRun, Comparison, compare_runs
-from walkers.runs.listing import ListEntry, bytes_text, size_and_last_change
+from walkers.runs.listing import ListEntry, RunsOfCase, bytes_text, size_and_last_change
 from walkers.runs.removal import Removal, remove, unfinished_in
 from walkers.sweeps.listing import without_draws, without_members
 from walkers.sweeps.record import read_sweep_record
@@ -274,6 +274,34 @@ def test_draws_of_an_earlier_number_of_points_are_hidden_with_those_of_the_last(
     )
     assert without_members([spread, asked_for, old, new]) == [spread, asked_for]
     assert without_draws([spread, asked_for, old, new]) == [spread, asked_for]
+
+
+@pytest.mark.parametrize(
+    ("second", "texts"),
+    [
+        pytest.param(7.0e-5, ["79.84 µm", "70 µm"], id="apart"),
+        pytest.param(7.98356e-5, ["79.8355 µm", "79.8356 µm"], id="close"),
+    ],
+)
+def test_values_that_no_run_gives_are_listed_with_four_digits(
+    second: float, texts: list[str]
+) -> None:
+    runs = []
+    for radius in (7.98355e-5, second):
+        place = Path(f"a-{len(runs)}")
+        parameters = FlatCase({"liquid.meniscus_radius": radius})
+        run = ListEntry(
+            kind="run",
+            name=place.name,
+            case="a",
+            status="finished",
+            directory=place,
+            parameters=parameters,
+        )
+        runs.append(run)
+    listed = RunsOfCase("a", runs, ["liquid.meniscus_radius"]).as_text()
+    for line, text in zip(listed.splitlines()[1:], texts, strict=True):
+        assert line.endswith(f"  {text}")
 
 
 def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:

@@ -22,7 +22,7 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.units import with_symbols
 from walkers.postprocess.measure.numbers import headline, short_text
 from walkers.postprocess.measure.results import Results, json_numbers, read_results
-from walkers.rounding import duration_text
+from walkers.rounding import DIGITS, duration_text
 from walkers.runner import run_directory
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runs.case_text import (
@@ -388,13 +388,33 @@ class RunsOfCase:
         """
         heads = [f"{self.case} ({len(self.runs)})", "status", "result", "age", "size"]
         lines = [[*heads, *short_keys(self.keys)]]
-        for run in self.runs:
+        columns = [self._value_texts(key) for key in self.keys]
+        for number, run in enumerate(self.runs):
             status = run.status
             if run.reason:
                 status = f"{run.status}: {run.reason}"
-            values = [with_symbols(value_text(run.parameters, key)) for key in self.keys]
+            values = [with_symbols(texts[number]) for texts in columns]
             lines.append([run.name, status, run.result, *run.age_and_size, *values])
         return fitted_table(lines, len(heads), width, styled_column=1)
+
+    def _value_texts(self, key: str) -> list[str]:
+        """The value of a key in each run.
+
+        Numbers that no run gives itself have `DIGITS` digits if these distinguish all of them.
+        """
+        texts = [value_text(run.parameters, key) for run in self.runs]
+        for run in self.runs:
+            if run.parameters.origin_words.get(key, "").startswith("given"):
+                return texts
+        rounded_texts = []
+        for run in self.runs:
+            parameters = dict(run.parameters)
+            if isinstance(parameters.get(key), float):
+                parameters[key] = float(f"{parameters[key]:.{DIGITS}g}")
+            rounded_texts.append(value_text(parameters, key))
+        if len(set(rounded_texts)) < len(set(texts)):
+            return texts
+        return rounded_texts
 
 
 def by_case(runs: Sequence[ListEntry]) -> list[RunsOfCase]:
