@@ -1580,3 +1580,20 @@ def test_options_of_an_export(options: str, message: str, finished_run: Path) ->
 )
 def test_options_of_a_film(options: str, message: str, finished_run: Path) -> None:
     assert_refused(f"render --film {finished_run} {options}", message, folders=[finished_run])
+
+
+def test_a_list_of_tables_cannot_be_set_whole() -> None:
+    problem = (
+        "boundary.planes: is a list of tables, which only a case file has: [[boundary.planes]]"
+    )
+    assert_refused("show fig1b --set boundary.planes=[]", problem)
+
+
+def test_a_vessel_without_planes_says_how_to_give_them() -> None:
+    boundary = {"shape": "vessel", "height": "5 mm", "planes": []}
+    Path("mine.toml").write_text(to_toml(document(boundary=boundary)))
+    done = call("show", "mine.toml")
+    assert done.returncode == 2
+    assert "boundary.planes = []: missing; expected at least one table [[boundary.planes]]" in (
+        done.stderr
+    )

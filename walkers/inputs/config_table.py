@@ -346,8 +346,12 @@ class ConfigTable(BaseModel):
         instead
             End of the message, such as ``, or diameters``: what may be given in its place.
         """
-        example = example_of(cls.model_fields[name])
-        return Problem(key_within(place, name), None, f"missing; expected {example}{instead}")
+        whole_key = key_within(place, name)
+        field = cls.model_fields[name]
+        example = example_of(field)
+        if is_list_of_tables(field):
+            example = f"at least one table [[{whole_key}]]"
+        return Problem(whole_key, None, f"missing; expected {example}{instead}")
 
 
 def _has_any(given: Mapping[str, Any], names: Iterable[str]) -> bool:
@@ -416,6 +420,11 @@ def is_table(field: FieldInfo | None) -> bool:
     if field is None or table_in(field.annotation) is None:
         return False
     return not any(isinstance(item, Discriminator) for item in field.metadata)
+
+
+def is_list_of_tables(field: FieldInfo | None) -> bool:
+    """Whether the value of a field is a list of tables, such as ``[[boundary.planes]]``."""
+    return field is not None and is_table(field) and get_origin(field.annotation) in (tuple, list)
 
 
 def is_number_or_table(field: FieldInfo | None) -> bool:
