@@ -358,9 +358,13 @@ def test_quiet_prints_results_alone(in_folder: Path) -> None:
 
 
 def test_verbose_contradicts_quiet(in_folder: Path) -> None:
-    done = call("run", "fig1b", "-q", "-v")
+    for command in (["run", "fig1b"], ["sweep", "fig4"]):
+        done = call(*command, "-q", "-v")
+        assert done.returncode == 2
+        assert "--verbose: prints more and --quiet less: expected one of them" in done.stderr
+    done = call("run", "fig1b", "--json", "-v")
     assert done.returncode == 2
-    assert "--verbose: is for texts: not with --quiet" in done.stderr
+    assert "--verbose: prints a text: expected without --json" in done.stderr
     assert not list(in_folder.iterdir())
 
 

@@ -153,7 +153,8 @@ def run(
     from walkers.sweeps.spread import spread_sweep
 
     draws = _number_of_draws(spread, points)
-    refuse("--verbose", verbose and (quiet or as_json), "is for texts: not with --quiet or --json")
+    refuse("--verbose", verbose and quiet, "prints more and --quiet less: expected one of them")
+    refuse("--verbose", verbose and as_json, "prints a text: expected without --json")
     refuse("--json", as_json and dry_run, "is for results, not for --dry-run")
     # Report a mistake in the last file before the first run starts.
     references = [lookup.find(case, quiet=quiet) for case in cases]
@@ -323,7 +324,7 @@ def sweep(
         jobs is not None and site is not None,
         "the site file sets how many decks run at once",
     )
-    refuse("--verbose", verbose and quiet, "not with --quiet")
+    refuse("--verbose", verbose and quiet, "prints more and --quiet less: expected one of them")
     if len(loaded.rows) > _MANY_POINTS and not quiet:
         duration = duration_text(len(loaded.rows) / _RESOLVED_PER_SECOND)
         tell(f"{loaded.name}: resolving {len(loaded.rows)} points, which takes about {duration}")
