@@ -1597,3 +1597,9 @@ def test_a_vessel_without_planes_says_how_to_give_them() -> None:
     assert "boundary.planes = []: missing; expected at least one table [[boundary.planes]]" in (
         done.stderr
     )
+
+
+def test_an_entry_of_a_list_that_the_case_lacks_says_what_the_case_has() -> None:
+    problem = "the base case has no dimers.diameters but dimers.radii; expected the whole list"
+    example = "such as dimers.diameters=[0.6 mm, 0.4 mm]"
+    assert_refused('show fig1b --set "dimers.diameters[0]=1 mm"', f"{problem}, {example}")
