@@ -428,6 +428,20 @@ def test_clean_keeps_runs_that_other_sweeps_have(out: Path) -> None:
     assert not (out / "rough").exists()
 
 
+def test_clean_keeps_runs_of_a_sweep_that_were_run_by_themselves(
+    out: Path, run_of_three: str
+) -> None:
+    place = finished_places(out)[run_of_three]
+    others = _names_of_points(out / "beads") - _names_of_points(out / "three")
+    walkers.run(walkers.Run(place).case, out)
+    call("clean", "three", "beads", "--yes", check=True)
+    left = finished_places(out)
+    assert run_of_three in left
+    assert left.keys().isdisjoint(others)
+    call("clean", run_of_three, "--yes", check=True)
+    assert run_of_three not in finished_places(out)
+
+
 @pytest.fixture
 def run_of_three(out: Path) -> str:
     """A run that the sweep three alone has: friction 0.2, 6 g."""
