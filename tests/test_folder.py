@@ -40,7 +40,7 @@ from walkers.runner.run_directory import case_of, locked
 from walkers.runs.case_text import FlatCase, readable
 from walkers.runs.comparison import ComparedRun, Comparison, compare_runs
 from walkers.runs.listing import ListEntry, RunsOfCase, bytes_text, size_and_last_change
-from walkers.runs.removal import Removal, remove, unfinished_in
+from walkers.runs.removal import Removal, RemovalKind, removal_text, remove, unfinished_in
 from walkers.sweeps.listing import without_draws, without_members
 from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.removal import removals_in
@@ -460,6 +460,20 @@ def test_clean_says_which_sweep_needs_a_named_run(out: Path, run_of_three: str) 
     )
     statuses = walkers.load(out / "three").table()["status"].tolist()
     assert statuses.count("missing") == 1
+
+
+def test_the_total_of_a_removal_counts_draws_in_a_spread_once(tmp_path: Path) -> None:
+    spread = tmp_path / "a-0-spread"
+    draw = spread / "a-1"
+    draw.mkdir(parents=True)
+    (draw / "dumps").write_bytes(bytes(4000))
+    (spread / "sweep.json").write_bytes(bytes(200))
+    removals = [
+        Removal(spread, RemovalKind.SWEEP),
+        Removal(draw, RemovalKind.RUN, "finished"),
+    ]
+    total = removal_text(removals).splitlines()[-1]
+    assert total == "1 sweep, 1 finished run to remove, 4.2 kB"
 
 
 def test_clean_removes_with_a_run_its_spread_and_its_accuracy(out: Path, run_of_three: str) -> None:
