@@ -245,9 +245,10 @@ def test_list_selects_by_values(out: Path, conditions: list[str], number: int) -
     ("condition", "message"),
     [
         ("colour=red", '"colour=red": no run has such a key'),
+        ("speed>1 mm/s", 'no run has such a key; did you mean "velocity"?'),
         ("friction.bead_wall=5 mm", 'friction.bead_wall=5 mm": expected a number without a unit'),
     ],
-    ids=["unknown key", "wrong unit"],
+    ids=["unknown key", "other word", "wrong unit"],
 )
 def test_list_refuses_a_condition_that_no_run_can_meet(
     out: Path, condition: str, message: str

@@ -40,6 +40,8 @@ from walkers.text import fitted_table
 
 _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 """Bytes in the units of sizes, the largest first."""
+_USUAL_NAMES = {"speed": "velocity"}
+"""Names of numbers of results, by other words that a user may look for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -356,6 +358,9 @@ def _no_such_key(condition: Condition, runs: Sequence[ListEntry]) -> InputError:
         numbers.update(run.numbers or ())
     names = short_keys(sorted(keys))
     near = suggestion(condition.key, [*names, *sorted(numbers)])
+    usual_name = _USUAL_NAMES.get(condition.key)
+    if usual_name in numbers:
+        near = f'; did you mean "{usual_name}"?'
     text = f'"{condition.text}": no run has such a key{near}; runs have {", ".join(names)}'
     if numbers:
         text += ", and the numbers of their results, such as velocity"
