@@ -208,7 +208,7 @@ def test_list_has_a_column_for_each_value_that_differs(out: Path) -> None:
     lines = call("list", "--all", check=True).stdout.splitlines()
     (head,) = (line.split() for line in lines if line.startswith("base ("))
     assert head[2:6] == ["status", "result", "age", "size"]
-    assert {"frequency", "peak_acceleration", "bead_wall"} <= set(head)
+    assert {"frequency", "peak_acceleration", "friction.bead_wall"} <= set(head)
 
 
 def test_list_hides_runs_of_sweeps_unless_they_were_asked_for(out: Path) -> None:

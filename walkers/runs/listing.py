@@ -392,7 +392,7 @@ class RunsOfCase:
         If the columns are wider than ``width``, the values stand below each run.
         """
         heads = [f"{self.case} ({len(self.runs)})", "status", "result", "age", "size"]
-        lines = [[*heads, *short_keys(self.keys)]]
+        lines = [[*heads, *self._headings]]
         columns = [self._value_texts(key) for key in self.keys]
         for number, run in enumerate(self.runs):
             status = run.status
@@ -401,6 +401,18 @@ class RunsOfCase:
             values = [with_symbols(texts[number]) for texts in columns]
             lines.append([run.name, status, run.result, *run.age_and_size, *values])
         return fitted_table(lines, len(heads), width, styled_column=1)
+
+    @property
+    def _headings(self) -> list[str]:
+        """The headings of the keys: their last parts, or the last two if a table is in a table.
+
+        ``bead_wall`` alone may be a friction or a roughness.
+        """
+        headings = short_keys(self.keys)
+        for number, key in enumerate(self.keys):
+            if key.count(".") > 1:
+                _, _, headings[number] = key.partition(".")
+        return headings
 
     def _value_texts(self, key: str) -> list[str]:
         """The value of a key in each run.
