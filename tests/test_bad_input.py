@@ -1603,3 +1603,21 @@ def test_an_entry_of_a_list_that_the_case_lacks_says_what_the_case_has() -> None
     problem = "the base case has no dimers.diameters but dimers.radii; expected the whole list"
     example = "such as dimers.diameters=[0.6 mm, 0.4 mm]"
     assert_refused('show fig1b --set "dimers.diameters[0]=1 mm"', f"{problem}, {example}")
+
+
+@pytest.mark.parametrize(
+    ("command", "suggested"),
+    [
+        pytest.param("show mien.toml", "mine", id="a file"),
+        pytest.param("show mien", "mine", id="a file without its ending"),
+        pytest.param("sweep figg2.toml", "fig2", id="a shipped sweep"),
+        pytest.param("list speeed", "speed", id="a sweep in the folder"),
+    ],
+)
+def test_a_misspelt_name_is_answered_by_the_name_that_is_there(
+    command: str, suggested: str
+) -> None:
+    Path("mine.toml").write_text(to_toml(document()))
+    Path("runs/speed").mkdir(parents=True)
+    Path("runs/speed/sweep.json").write_text("{}")
+    assert_refused(command, f'did you mean "{suggested}"?')
