@@ -1580,3 +1580,44 @@ def test_options_of_an_export(options: str, message: str, finished_run: Path) ->
 )
 def test_options_of_a_film(options: str, message: str, finished_run: Path) -> None:
     assert_refused(f"render --film {finished_run} {options}", message, folders=[finished_run])
+
+
+def test_a_list_of_tables_cannot_be_set_whole() -> None:
+    problem = (
+        "boundary.planes: is a list of tables, which only a case file has: [[boundary.planes]]"
+    )
+    assert_refused("show fig1b --set boundary.planes=[]", problem)
+
+
+def test_a_vessel_without_planes_says_how_to_give_them() -> None:
+    boundary = {"shape": "vessel", "height": "5 mm", "planes": []}
+    Path("mine.toml").write_text(to_toml(document(boundary=boundary)))
+    done = call("show", "mine.toml")
+    assert done.returncode == 2
+    assert "boundary.planes = []: missing; expected at least one table [[boundary.planes]]" in (
+        done.stderr
+    )
+
+
+def test_an_entry_of_a_list_that_the_case_lacks_says_what_the_case_has() -> None:
+    problem = "the base case has no dimers.diameters but dimers.radii; expected the whole list"
+    example = "such as dimers.diameters=[0.6 mm, 0.4 mm]"
+    assert_refused('show fig1b --set "dimers.diameters[0]=1 mm"', f"{problem}, {example}")
+
+
+@pytest.mark.parametrize(
+    ("command", "suggested"),
+    [
+        pytest.param("show mien.toml", "mine", id="a file"),
+        pytest.param("show mien", "mine", id="a file without its ending"),
+        pytest.param("sweep figg2.toml", "fig2", id="a shipped sweep"),
+        pytest.param("list speeed", "speed", id="a sweep in the folder"),
+    ],
+)
+def test_a_misspelt_name_is_answered_by_the_name_that_is_there(
+    command: str, suggested: str
+) -> None:
+    Path("mine.toml").write_text(to_toml(document()))
+    Path("runs/speed").mkdir(parents=True)
+    Path("runs/speed/sweep.json").write_text("{}")
+    assert_refused(command, f'did you mean "{suggested}"?')

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.collections import LineCollection
 
 import walkers
 from tests.conftest import ESCAPE, TINY, FillOnce, call, document, on_terminal, to_toml
@@ -19,7 +20,7 @@ from walkers.postprocess.measure.uncertainty import spread_of
 from walkers.runs.draws import Band, ComparedDraws, Draws, Unknown, compare_draws
 from walkers.runs.draws_text import compared_draws_text
 from walkers.sweeps.spread import draws_of
-from walkers.sweeps.table import load_table
+from walkers.sweeps.table import cells_of, load_table
 
 FRICTION = "contact.friction.bead_wall"
 RESTITUTION = "contact.restitution"
@@ -264,6 +265,39 @@ def test_a_sweep_needs_two_points_with_a_spread(both_points: list[Path], copied_
     (spread_of(runs / both_points[1].name) / "spread.json").unlink()
     with pytest.raises(InputError, match="expected a spread of the first point and of another"):
         walkers.compare("fast", out=runs)
+
+
+def test_a_band_of_one_point_alone_has_a_column(both_points: list[Path], copied_runs: Path) -> None:
+    shutil.rmtree(spread_of(copied_runs / both_points[1].name))
+    frame = load_table(copied_runs / "fast")
+    cells, same = cells_of(frame)
+    with_band, without = cells["velocity_low (mm/s)"].tolist()
+    assert float(with_band) == pytest.approx(1e3 * frame["velocity_low"][0], rel=1e-2)
+    assert without == "-"
+    assert "velocity_" not in same
+
+
+def test_a_band_between_points_without_one_is_drawn_as_a_bar(
+    both_points: list[Path], copied_runs: Path
+) -> None:
+    sweep = walkers.Sweep(copied_runs / "fast")
+    assert bars_of(sweep) == []  # the band joins both points
+    shutil.rmtree(spread_of(copied_runs / both_points[1].name))
+    low, high = sweep.refresh().table().loc[0, ["velocity_low", "velocity_high"]]
+    ((place, *ends),) = bars_of(sweep)
+    assert place == 3.0  # g, of the first point
+    assert ends == pytest.approx([1e3 * low, 1e3 * high])
+
+
+def bars_of(sweep: walkers.Sweep) -> list[list[float]]:
+    """Place, lower and upper end of the bars in the only panel of the figure of a sweep."""
+    (axes,) = sweep.figure().axes
+    bars = []
+    for lines in axes.collections:
+        if isinstance(lines, LineCollection) and lines.get_linewidth()[0] == 4.0:
+            for (place, low), (_, high) in lines.get_segments():
+                bars.append([place, low, high])
+    return bars
 
 
 def test_a_damaged_spread_counts_as_none(both_points: list[Path], copied_runs: Path) -> None:

@@ -37,10 +37,11 @@ from walkers.postprocess.measure.uncertainty import ACCURACY_NAME, SPREAD_NAME, 
 from walkers.progress import Progress
 from walkers.runner.manifest import MANIFEST_NAME, checksums
 from walkers.runner.run_directory import case_of, locked
-from walkers.runs.case_text import readable
+from walkers.runs.case_text import FlatCase, readable
 from walkers.runs.comparison import ComparedRun, Comparison, compare_runs
-from walkers.runs.listing import bytes_text, size_and_last_change
-from walkers.runs.removal import Removal, remove, unfinished_in
+from walkers.runs.listing import ListEntry, RunsOfCase, bytes_text, size_and_last_change
+from walkers.runs.removal import Removal, RemovalKind, removal_text, remove, unfinished_in
+from walkers.sweeps.listing import without_draws, without_members
 from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.removal import removals_in
 from walkers.sweeps.scheduler import SweepOptions, plan_sweep
@@ -207,7 +208,7 @@ def test_list_has_a_column_for_each_value_that_differs(out: Path) -> None:
     lines = call("list", "--all", check=True).stdout.splitlines()
     (head,) = (line.split() for line in lines if line.startswith("base ("))
     assert head[2:6] == ["status", "result", "age", "size"]
-    assert {"frequency", "peak_acceleration", "bead_wall"} <= set(head)
+    assert {"frequency", "peak_acceleration", "friction.bead_wall"} <= set(head)
 
 
 def test_list_hides_runs_of_sweeps_unless_they_were_asked_for(out: Path) -> None:
@@ -244,9 +245,10 @@ def test_list_selects_by_values(out: Path, conditions: list[str], number: int) -
     ("condition", "message"),
     [
         ("colour=red", '"colour=red": no run has such a key'),
+        ("speed>1 mm/s", 'no run has such a key; did you mean "velocity"?'),
         ("friction.bead_wall=5 mm", 'friction.bead_wall=5 mm": expected a number without a unit'),
     ],
-    ids=["unknown key", "wrong unit"],
+    ids=["unknown key", "other word", "wrong unit"],
 )
 def test_list_refuses_a_condition_that_no_run_can_meet(
     out: Path, condition: str, message: str
@@ -254,6 +256,53 @@ def test_list_refuses_a_condition_that_no_run_can_meet(
     ended = _list_where([condition])
     assert ended.returncode == 2
     assert message in ended.stderr
+
+
+def test_draws_of_an_earlier_number_of_points_are_hidden_with_those_of_the_last() -> None:
+    def run(name: str) -> ListEntry:
+        return ListEntry(kind="run", name=name, case="a", status="finished", directory=Path(name))
+
+    old = run("a-0-spread/a-1")
+    new = run("a-0-spread/a-2")
+    asked_for = run("a-0")
+    spread = ListEntry(
+        kind="sweep",
+        name="a-0-spread",
+        case="a",
+        status="finished",
+        directory=Path("a-0-spread"),
+        runs=[new.name],
+    )
+    assert without_members([spread, asked_for, old, new]) == [spread, asked_for]
+    assert without_draws([spread, asked_for, old, new]) == [spread, asked_for]
+
+
+@pytest.mark.parametrize(
+    ("second", "texts"),
+    [
+        pytest.param(7.0e-5, ["79.84 µm", "70 µm"], id="apart"),
+        pytest.param(7.98356e-5, ["79.8355 µm", "79.8356 µm"], id="close"),
+    ],
+)
+def test_values_that_no_run_gives_are_listed_with_four_digits(
+    second: float, texts: list[str]
+) -> None:
+    runs = []
+    for radius in (7.98355e-5, second):
+        place = Path(f"a-{len(runs)}")
+        parameters = FlatCase({"liquid.meniscus_radius": radius})
+        run = ListEntry(
+            kind="run",
+            name=place.name,
+            case="a",
+            status="finished",
+            directory=place,
+            parameters=parameters,
+        )
+        runs.append(run)
+    listed = RunsOfCase("a", runs, ["liquid.meniscus_radius"]).as_text()
+    for line, text in zip(listed.splitlines()[1:], texts, strict=True):
+        assert line.endswith(f"  {text}")
 
 
 def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
@@ -380,6 +429,20 @@ def test_clean_keeps_runs_that_other_sweeps_have(out: Path) -> None:
     assert not (out / "rough").exists()
 
 
+def test_clean_keeps_runs_of_a_sweep_that_were_run_by_themselves(
+    out: Path, run_of_three: str
+) -> None:
+    place = finished_places(out)[run_of_three]
+    others = _names_of_points(out / "beads") - _names_of_points(out / "three")
+    walkers.run(walkers.Run(place).case, out)
+    call("clean", "three", "beads", "--yes", check=True)
+    left = finished_places(out)
+    assert run_of_three in left
+    assert left.keys().isdisjoint(others)
+    call("clean", run_of_three, "--yes", check=True)
+    assert run_of_three not in finished_places(out)
+
+
 @pytest.fixture
 def run_of_three(out: Path) -> str:
     """A run that the sweep three alone has: friction 0.2, 6 g."""
@@ -398,6 +461,20 @@ def test_clean_says_which_sweep_needs_a_named_run(out: Path, run_of_three: str) 
     )
     statuses = walkers.load(out / "three").table()["status"].tolist()
     assert statuses.count("missing") == 1
+
+
+def test_the_total_of_a_removal_counts_draws_in_a_spread_once(tmp_path: Path) -> None:
+    spread = tmp_path / "a-0-spread"
+    draw = spread / "a-1"
+    draw.mkdir(parents=True)
+    (draw / "dumps").write_bytes(bytes(4000))
+    (spread / "sweep.json").write_bytes(bytes(200))
+    removals = [
+        Removal(spread, RemovalKind.SWEEP),
+        Removal(draw, RemovalKind.RUN, "finished"),
+    ]
+    total = removal_text(removals).splitlines()[-1]
+    assert total == "1 sweep, 1 finished run to remove, 4.2 kB"
 
 
 def test_clean_removes_with_a_run_its_spread_and_its_accuracy(out: Path, run_of_three: str) -> None:

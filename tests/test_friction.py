@@ -588,7 +588,7 @@ def test_a_list_of_runs_shows_a_number_and_a_growing_friction_in_one_column() ->
         runs.append(entry)
     (runs_of_case,) = by_case(runs)
     head, first, second = runs_of_case.as_text().splitlines()
-    column = head.index("bead_wall")
+    column = head.index("friction.bead_wall")
     assert first[column:].split() == ["0.25"]
     assert second[column:].startswith("0.1 + 0.4 v/(v + 20 mm/s)")
     assert "rise" not in head

@@ -695,6 +695,16 @@ def test_compare_gives_what_its_command_prints(looked_through: Path) -> None:
     assert as_json(comparison.contents) == json.loads(done.stdout)
 
 
+def test_runs_and_sweeps_themselves_stand_for_their_names(looked_through: Path) -> None:
+    runs = walkers.load("grid", looked_through).runs
+    first, second = runs[:2]
+    by_name = walkers.compare(first.directory.name, second.directory.name, looked_through)
+    assert walkers.compare(first, second).text == by_name.text
+    assert walkers.run(first) == first
+    with pytest.raises(InputError, match=r"grid: is a sweep"):
+        walkers.compare(first, walkers.load("grid", looked_through))
+
+
 def test_compare_refuses_sweeps_in_the_words_of_its_command(looked_through: Path) -> None:
     done = call("compare", "grid", "rough", "--out", str(looked_through))
     assert done.returncode == 2

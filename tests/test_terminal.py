@@ -358,9 +358,13 @@ def test_quiet_prints_results_alone(in_folder: Path) -> None:
 
 
 def test_verbose_contradicts_quiet(in_folder: Path) -> None:
-    done = call("run", "fig1b", "-q", "-v")
+    for command in (["run", "fig1b"], ["sweep", "fig4"]):
+        done = call(*command, "-q", "-v")
+        assert done.returncode == 2
+        assert "--verbose: prints more and --quiet less: expected one of them" in done.stderr
+    done = call("run", "fig1b", "--json", "-v")
     assert done.returncode == 2
-    assert "--verbose: is for texts: not with --quiet" in done.stderr
+    assert "--verbose: prints a text: expected without --json" in done.stderr
     assert not list(in_folder.iterdir())
 
 
@@ -376,11 +380,35 @@ def test_a_dry_run_writes_nothing_and_says_what_is_missing(in_folder: Path) -> N
     assert not list(in_folder.iterdir())
 
 
+def test_a_dry_run_prints_the_notes_of_cases_that_would_be_run(in_folder: Path) -> None:
+    unit = "drive.frequency=80 kHz"
+    planned = call("run", "fig1b", "--dry-run", "--set", unit, check=True)
+    assert re.search(r"^walkers: fig1b: .*80 kHz", planned.stderr, re.MULTILINE), planned.stderr
+    assert call("run", "fig1b", "--dry-run", "-q", "--set", unit, check=True).stderr == ""
+    assert call("run", "fig1b", "--dry-run", check=True).stderr == ""
+
+
+def test_fewer_draws_tell_that_they_replace_the_band_of_more(folder: Path, tmp_path: Path) -> None:
+    runs = shutil.copytree(folder / "runs", tmp_path / "runs")
+    options = ["mine.toml", "--runs", str(runs), "--spread", "--points"]
+    more = call("run", *options, "3", check=True, folder=folder)
+    assert "replaces" not in more.stderr
+    fewer = call("run", *options, "2", check=True, folder=folder)
+    replaced = "mine: the band of 2 draws replaces that of 3 draws, which are kept"
+    assert replaced in fewer.stderr.replace("\n", " ")
+
+
 def test_a_dry_run_knows_a_finished_run_and_its_draws(folder: Path) -> None:
     options = ["--dry-run", "--spread", "--points", "2"]
     planned = call("run", "mine.toml", *options, check=True, folder=folder).stdout
     assert re.search(r"status     finished, [\d.]+ mm/s\n  to do      nothing", planned)
     assert "spread     0 more runs" in planned
+
+
+def test_a_forced_dry_run_says_that_the_finished_run_is_made_again(folder: Path) -> None:
+    planned = call("run", "mine.toml", "--dry-run", "--force", check=True, folder=folder).stdout
+    assert re.search(r"status     finished, [\d.]+ mm/s\n", planned)
+    assert re.search(r"to do      run again and replace the result, predicted \d+ s\n", planned)
 
 
 def test_a_dry_run_says_how_much_of_a_run_is_left(in_folder: Path) -> None:

@@ -59,6 +59,7 @@ from walkers.runs.making import make_runs, progress_at
 from walkers.runs.names import (
     Changes,
     Given,
+    InDirectory,
     Reference,
     find,
     is_begun,
@@ -117,15 +118,18 @@ _OPTIONS_OF_FORMS: Mapping[str, tuple[str, ...]] = {
 
 
 def load(
-    reference: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None
+    reference: Given | InDirectory | Reference,
+    out: str | Path = DEFAULT_OUT,
+    changes: Changes = None,
 ) -> Run | Sweep:
     """Find a sweep, or a run, finished or not.
 
     Parameters
     ----------
     reference
-        The directory of a run or a sweep, its name in the folder ``out``, or a case (resolved,
-        tables, file or shipped name), which means its run with the installed engine.
+        The directory of a run or a sweep, its name in the folder ``out``, a `Run` or a `Sweep`, or
+        a case (resolved, tables, file or shipped name), which means its run with the installed
+        engine.
     out
         Folder of the run directories.
     changes
@@ -811,7 +815,7 @@ def _path_or(to: str | Path | None, folder: Path | None, name: str) -> Path | No
 
 
 def run(
-    case: Given,
+    case: Given | InDirectory,
     out: str | Path = DEFAULT_OUT,
     *,
     engine: str | None = None,
@@ -827,7 +831,8 @@ def run(
     ----------
     case : Case, str, Path or mapping
         A case (resolved by `load_case`, the tables of a case file, a file or the name of a shipped
-        case), a run, by its name or directory, or the folder of a deck that was run by hand.
+        case), a run (`Run`, or its name or directory), or the folder of a deck that was run by
+        hand.
     out : str or Path
         Folder of the run directories; it is made if it does not exist.
     engine : str, optional
@@ -1325,7 +1330,7 @@ def sweep(
 
 
 def draw_start(
-    case: Given | Reference,
+    case: Given | InDirectory | Reference,
     to: str | Path | None = None,
     out: str | Path = DEFAULT_OUT,
     changes: Changes = None,
@@ -1385,8 +1390,8 @@ def has_not_begun(reference: Reference) -> bool:
 
 
 def compare(
-    first: str | Path | Reference,
-    second: str | Path | Reference | None = None,
+    first: Given | InDirectory | Reference,
+    second: Given | InDirectory | Reference | None = None,
     out: str | Path = DEFAULT_OUT,
     changes: Mapping[str, Any] | None = None,
 ) -> Comparison:
@@ -1399,8 +1404,8 @@ def compare(
     Parameters
     ----------
     first, second
-        Runs or cases, named as for `load`. The second one is the first by default. A sweep by
-        itself: its points are compared with its first one.
+        Runs (`Run`) or cases, or their names as for `load`. The second one is the first by
+        default. A sweep by itself: its points are compared with its first one.
     out
         Folder of the run directories.
     changes
@@ -1446,7 +1451,7 @@ def _side(named: Reference) -> ComparedRun:
 
 
 def climb(
-    references: Sequence[str | Path | Reference],
+    references: Sequence[Given | InDirectory | Reference],
     out: str | Path = DEFAULT_OUT,
     changes: Changes = None,
     *,
@@ -1578,7 +1583,9 @@ def calibrate(
 
 
 def predict(
-    case: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None
+    case: Given | InDirectory | Reference,
+    out: str | Path = DEFAULT_OUT,
+    changes: Changes = None,
 ) -> dict[str, Any]:
     """Predict the motion of the dimer of a case by the theory.
 

@@ -23,7 +23,8 @@ from walkers.sweeps.removal import removals_in
 from walkers.templates.deck import RUN_NAME, render_deck, single_segment
 
 _REMOVED = (
-    "Runs, with their spreads and accuracies, and sweeps, with the runs that no other sweep has."
+    "Runs, with their spreads and accuracies, and sweeps, with the runs that no other sweep has "
+    "and that were not run by themselves."
 )
 
 

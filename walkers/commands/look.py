@@ -25,6 +25,7 @@ from walkers.commands.options import (
     run_of,
     tell,
 )
+from walkers.errors import input_error, suggestion
 from walkers.postprocess.measure.table_units import UnitSystem
 from walkers.postprocess.show.film_options import FilmOptions, Seconds
 from walkers.sweeps.figure_options import FigureOptions
@@ -88,11 +89,15 @@ def _list_points(name: str, out: Path, to: Path | None, units: UnitSystem, as_js
     from walkers.postprocess.measure.table_units import in_units
     from walkers.runs.names import find
     from walkers.sweeps import table
+    from walkers.sweeps.record import RECORD_NAME
 
     reference = find(name, out)
     kind = reference.kind
     refuse(name, kind == "run", f"is a run: walkers run {name} prints its result")
-    refuse(name, kind == "case", f"no sweep in {out}; walkers list shows what is there")
+    if kind == "case":
+        sweeps = [record.parent.name for record in sorted(out.glob(f"*/{RECORD_NAME}"))]
+        hint = suggestion(name, sweeps) or "; walkers list shows what is there"
+        raise input_error(name, f"no sweep in {out}{hint}")
     refuse(
         name,
         kind != "sweep",

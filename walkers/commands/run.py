@@ -153,7 +153,8 @@ def run(
     from walkers.sweeps.spread import spread_sweep
 
     draws = _number_of_draws(spread, points)
-    refuse("--verbose", verbose and (quiet or as_json), "is for texts: not with --quiet or --json")
+    refuse("--verbose", verbose and quiet, "prints more and --quiet less: expected one of them")
+    refuse("--verbose", verbose and as_json, "prints a text: expected without --json")
     refuse("--json", as_json and dry_run, "is for results, not for --dry-run")
     # Report a mistake in the last file before the first run starts.
     references = [lookup.find(case, quiet=quiet) for case in cases]
@@ -205,12 +206,11 @@ def _run_one(
 ) -> bool:
     """Run a case unless its run is finished, and print the result; return whether a run failed."""
     from walkers.runner.failures import EngineFailure
-    from walkers.runs.preview import notes
 
     is_told = not options.quiet
     engine = options.engine
     if finished_run is None and is_told:
-        tell(*[f"{case.name}: {note}" for note in notes(case)])
+        _tell_notes(case)
     try:
         done = finished_run or walkers.run(
             case,
@@ -230,6 +230,13 @@ def _run_one(
         band = done.spread(options.draws, progress=is_told, engine=engine)
     _print_run(done, band, options)
     return band is not None and bool(band.failures)
+
+
+def _tell_notes(case: Case) -> None:
+    """Print what a user should know about a case before it is run."""
+    from walkers.runs.preview import notes
+
+    tell(*[f"{case.name}: {note}" for note in notes(case)])
 
 
 def _print_run(run: walkers.Run, band: Spread | None, options: _RunOptions) -> None:
@@ -257,6 +264,8 @@ def _print_plan_of_run(reference: Reference, options: _RunOptions) -> None:
     from walkers.sweeps.spread import plan_spread
 
     plan = plan_run(reference, options.engine, force=options.force)
+    if plan.is_run and not options.quiet:
+        _tell_notes(plan.case)
     print(plan.as_text())
     folder = plan.directory.parent
     further = {}
@@ -324,7 +333,7 @@ def sweep(
         jobs is not None and site is not None,
         "the site file sets how many decks run at once",
     )
-    refuse("--verbose", verbose and quiet, "not with --quiet")
+    refuse("--verbose", verbose and quiet, "prints more and --quiet less: expected one of them")
     if len(loaded.rows) > _MANY_POINTS and not quiet:
         duration = duration_text(len(loaded.rows) / _RESOLVED_PER_SECOND)
         tell(f"{loaded.name}: resolving {len(loaded.rows)} points, which takes about {duration}")

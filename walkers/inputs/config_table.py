@@ -16,8 +16,8 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError, PydanticUndefined
 
-from walkers.errors import InputError, Problem, key_error, quoted
-from walkers.inputs.keys import MISSING, is_below, joined, parts_of, value_at
+from walkers.errors import Problem, key_error, quoted
+from walkers.inputs.keys import MISSING, is_below, joined, parts_of, value_at, written
 from walkers.inputs.units import WRITTEN, is_auto, kind_in
 
 T = TypeVar("T")
@@ -346,8 +346,12 @@ class ConfigTable(BaseModel):
         instead
             End of the message, such as ``, or diameters``: what may be given in its place.
         """
-        example = example_of(cls.model_fields[name])
-        return Problem(key_within(place, name), None, f"missing; expected {example}{instead}")
+        whole_key = key_within(place, name)
+        field = cls.model_fields[name]
+        example = example_of(field)
+        if is_list_of_tables(field):
+            example = f"at least one table [[{whole_key}]]"
+        return Problem(whole_key, None, f"missing; expected {example}{instead}")
 
 
 def _has_any(given: Mapping[str, Any], names: Iterable[str]) -> bool:
@@ -416,6 +420,11 @@ def is_table(field: FieldInfo | None) -> bool:
     if field is None or table_in(field.annotation) is None:
         return False
     return not any(isinstance(item, Discriminator) for item in field.metadata)
+
+
+def is_list_of_tables(field: FieldInfo | None) -> bool:
+    """Whether the value of a field is a list of tables, such as ``[[boundary.planes]]``."""
+    return field is not None and is_table(field) and get_origin(field.annotation) in (tuple, list)
 
 
 def is_number_or_table(field: FieldInfo | None) -> bool:
@@ -573,6 +582,7 @@ def changed(
         value = changes[name]
         _make_table_of_number(model, tables, name, changes)
         excluded = alternatives(model, name, value) - changes.keys()
+        _refuse_missing_entry(model, tables, name, value)
         _set_value_at(tables, name, copy.deepcopy(value), excluded)
     return tables
 
@@ -654,13 +664,11 @@ def _set_value_at(tables: dict[str, Any], name: str, value: Any, excluded: Itera
     parts = parts_of(name)
     for number, part in enumerate(parts):
         above = joined(parts[:number])
-        if isinstance(part, int):
-            if not isinstance(place, list) or part >= len(place):
-                raise _no_entry_error(name, value, above, place)
-        elif isinstance(place, list):
+        is_index = isinstance(part, int)
+        if isinstance(place, list) and not is_index:
             message = f"{above} is a list: say which one, such as {above}[0]"
             raise key_error(name, message, value)
-        elif not isinstance(place, dict):
+        if not is_index and not isinstance(place, dict):
             return  # the base case is wrong there: its own validation says so
         if number == len(parts) - 1:
             break
@@ -670,10 +678,40 @@ def _set_value_at(tables: dict[str, Any], name: str, value: Any, excluded: Itera
     place[parts[-1]] = value
 
 
-def _no_entry_error(name: str, value: Any, above: str, place: object) -> InputError:
-    """The error of a key that names an entry which the list above it does not have."""
-    expected = "the whole list"
-    if isinstance(place, list):
-        expected = f"an index below [{len(place)}]"
-    message = f"the base case has no {above} of that length; expected {expected}"
-    return key_error(name, message, value)
+def _refuse_missing_entry(
+    model: type[ConfigTable], tables: Mapping[str, Any], name: str, value: Any
+) -> None:
+    """Raise `InputError` if a dotted key names an entry that the list above it does not have.
+
+    If the tables have another key in place of the list, such as radii for diameters, the message
+    says so.
+    """
+    parts = parts_of(name)
+    for number, part in enumerate(parts):
+        if not isinstance(part, int):
+            continue
+        above = joined(parts[:number])
+        entries = value_at(tables, parts[:number])
+        message = f"the base case has no {above}"
+        if not isinstance(entries, list):
+            raise key_error(name, message + _whole_list_instead(model, tables, above), value)
+        if part >= len(entries):
+            expected = f"expected an index below [{len(entries)}]"
+            raise key_error(name, f"{message} of that length; {expected}", value)
+
+
+def _whole_list_instead(model: type[ConfigTable], tables: Mapping[str, Any], name: str) -> str:
+    """The end of a message about an entry of a list that the tables do not have.
+
+    It names the keys that they have in place of the list, and how to give the list.
+    """
+    present = []
+    for key in sorted(alternatives(model, name)):
+        if value_at(tables, parts_of(key)) is not MISSING:
+            present.append(key)
+    instead = f" but {' and '.join(present)}" if present else ""
+    example = ""
+    field = _field_at(model, parts_of(name))
+    if field is not None and field.examples:
+        example = f", such as {name}={written(field.examples[0])}"
+    return f"{instead}; expected the whole list{example}"

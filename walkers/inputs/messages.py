@@ -23,6 +23,7 @@ from walkers.inputs.config_table import (
     ConfigTable,
     dotted_keys,
     example_of,
+    is_list_of_tables,
     is_table,
     table_class_of,
     table_keys,
@@ -287,6 +288,9 @@ def check_key(model: type[ConfigTable], key: str) -> None:
     field = dotted_keys(model).get(".".join(parts))
     if field is None:
         raise key_error(key, _unknown_key(parts, model, "a case"))
+    if is_list_of_tables(field):
+        message = f"is a list of tables, which only a case file has: [[{key}]]"
+        raise key_error(key, f"{message}; expected a key of one of them, such as {key}[0].KEY")
     if is_table(field):
         raise key_error(key, "is a table of a case; expected one of its keys")
 

@@ -252,8 +252,18 @@ def find_input(name: str | Path, kind: str) -> Path:
     if kind == "case":
         missing = "no such file, run or sweep"
     names = ", ".join(shipped_files)
-    hint = suggestion(text, shipped_files)
+    hint = suggestion(path.stem, [*_files_beside(path), *shipped_files])
     raise input_error(name, f"{missing}, nor a shipped {kind} ({names}){hint}")
+
+
+def _files_beside(path: Path) -> list[str]:
+    """Names of the TOML files in the folder of a path, without their ending.
+
+    Empty if the folder cannot be read.
+    """
+    with suppress(OSError):
+        return sorted(file.stem for file in path.parent.glob("*.toml"))
+    return []
 
 
 def _kind_of(path: Path) -> str | None:

@@ -18,6 +18,7 @@ from walkers.inputs.tables.case import Case, CaseFile
 from walkers.inputs.units import QuantityKind, kind_in
 
 _NANOMETRES_PER_METRE = 1e9
+_MICROMETRES_PER_METRE = 1e6
 _COMPARED_DIGITS = 12
 """Significant digits in which values of different cases are compared."""
 _NOT_GIVEN = {"default", "derived"}
@@ -59,6 +60,8 @@ def readable(key: str, value: Any) -> str:
         return f"{value:.6g} m/s^2"
     if key.startswith("contact.roughness."):
         return f"{value * _NANOMETRES_PER_METRE:.6g} nm"
+    if key == "liquid.meniscus_radius":
+        return f"{value * _MICROMETRES_PER_METRE:.6g} um"
     kind = quantity_kind(key)
     if key == "drive.ramp":  # pairs of a time and a factor, which has no unit
         pairs = [f"({text_of(time, kind)}, {text_of(factor)})" for time, factor in value]

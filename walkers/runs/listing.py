@@ -22,7 +22,7 @@ from walkers.inputs.tables.case import Case
 from walkers.inputs.units import with_symbols
 from walkers.postprocess.measure.numbers import headline, short_text
 from walkers.postprocess.measure.results import Results, json_numbers, read_results
-from walkers.rounding import duration_text
+from walkers.rounding import DIGITS, duration_text
 from walkers.runner import run_directory
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runs.case_text import (
@@ -40,6 +40,8 @@ from walkers.text import fitted_table
 
 _SIZES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 """Bytes in the units of sizes, the largest first."""
+_USUAL_NAMES = {"speed": "velocity"}
+"""Names of numbers of results, by other words that a user may look for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -356,6 +358,9 @@ def _no_such_key(condition: Condition, runs: Sequence[ListEntry]) -> InputError:
         numbers.update(run.numbers or ())
     names = short_keys(sorted(keys))
     near = suggestion(condition.key, [*names, *sorted(numbers)])
+    usual_name = _USUAL_NAMES.get(condition.key)
+    if usual_name in numbers:
+        near = f'; did you mean "{usual_name}"?'
     text = f'"{condition.text}": no run has such a key{near}; runs have {", ".join(names)}'
     if numbers:
         text += ", and the numbers of their results, such as velocity"
@@ -387,14 +392,46 @@ class RunsOfCase:
         If the columns are wider than ``width``, the values stand below each run.
         """
         heads = [f"{self.case} ({len(self.runs)})", "status", "result", "age", "size"]
-        lines = [[*heads, *short_keys(self.keys)]]
-        for run in self.runs:
+        lines = [[*heads, *self._headings]]
+        columns = [self._value_texts(key) for key in self.keys]
+        for number, run in enumerate(self.runs):
             status = run.status
             if run.reason:
                 status = f"{run.status}: {run.reason}"
-            values = [with_symbols(value_text(run.parameters, key)) for key in self.keys]
+            values = [with_symbols(texts[number]) for texts in columns]
             lines.append([run.name, status, run.result, *run.age_and_size, *values])
         return fitted_table(lines, len(heads), width, styled_column=1)
+
+    @property
+    def _headings(self) -> list[str]:
+        """The headings of the keys: their last parts, or the last two if a table is in a table.
+
+        ``bead_wall`` alone may be a friction or a roughness.
+        """
+        headings = short_keys(self.keys)
+        for number, key in enumerate(self.keys):
+            if key.count(".") > 1:
+                _, _, headings[number] = key.partition(".")
+        return headings
+
+    def _value_texts(self, key: str) -> list[str]:
+        """The value of a key in each run.
+
+        Numbers that no run gives itself have `DIGITS` digits if these distinguish all of them.
+        """
+        texts = [value_text(run.parameters, key) for run in self.runs]
+        for run in self.runs:
+            if run.parameters.origin_words.get(key, "").startswith("given"):
+                return texts
+        rounded_texts = []
+        for run in self.runs:
+            parameters = dict(run.parameters)
+            if isinstance(parameters.get(key), float):
+                parameters[key] = float(f"{parameters[key]:.{DIGITS}g}")
+            rounded_texts.append(value_text(parameters, key))
+        if len(set(rounded_texts)) < len(set(texts)):
+            return texts
+        return rounded_texts
 
 
 def by_case(runs: Sequence[ListEntry]) -> list[RunsOfCase]:

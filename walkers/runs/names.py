@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from glob import escape
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, Protocol, TypeAlias, runtime_checkable
 
 from walkers import DEFAULT_OUT, RECORDS
 from walkers.errors import InputError, WalkersError, check_changes, check_text_or_path, input_error
@@ -30,6 +30,17 @@ NotARun = Literal["sweep", "calibration", "archive", "deck", "folder"]
 """Kinds of names for which there is no single run."""
 NameKind = Literal["run", "case"] | NotARun
 """What a name may mean; a deck is one that was run by hand, a folder one without a run."""
+
+
+@runtime_checkable
+class InDirectory(Protocol):
+    """What has a directory, such as a `walkers.Run` or a `walkers.Sweep`, and is named by it."""
+
+    @property
+    def directory(self) -> Path:
+        """The directory."""
+
+
 Given: TypeAlias = "Case | str | Path | Mapping[str, Any]"
 """What may stand for a case: a resolved case, its file or name, or its tables."""
 Changes: TypeAlias = "Mapping[str, Any] | None"
@@ -164,7 +175,9 @@ class Reference:
 
 
 def find(
-    given: Given | Reference, out: str | Path = DEFAULT_OUT, changes: Changes = None
+    given: Given | InDirectory | Reference,
+    out: str | Path = DEFAULT_OUT,
+    changes: Changes = None,
 ) -> Reference:
     """Find what a user means by a name. No case is read, and no run.
 
@@ -175,8 +188,8 @@ def find(
     ----------
     given
         The directory of a run or a sweep, its name in the folder ``out``, an archive, a deck that
-        was run by hand, or a case (resolved, tables, file or shipped name). A reference is
-        returned as it is, whatever ``out`` and ``changes`` are.
+        was run by hand, a run or a sweep itself, or a case (resolved, tables, file or shipped
+        name). A reference is returned as it is, whatever ``out`` and ``changes`` are.
     out
         Folder of the run directories.
     changes
@@ -190,6 +203,8 @@ def find(
     if isinstance(given, Reference):
         return given
     if not isinstance(given, (Case, Mapping)):
+        if isinstance(given, InDirectory):
+            given = given.directory
         check_text_or_path("case", given, "a case, its file, name or tables, or a run")
     check_text_or_path("out", out)
     check_changes(changes)

@@ -38,6 +38,8 @@ class RunPlan:
         much of the run is done.
     seconds
         Predicted run time of what is missing, s; 0 of a finished run.
+    again
+        Whether a finished run would be made again.
     """
 
     case: Case
@@ -45,6 +47,7 @@ class RunPlan:
     status: str
     result: str
     seconds: float
+    again: bool = False
 
     def as_text(self) -> str:
         """The plan in a few lines."""
@@ -59,13 +62,24 @@ class RunPlan:
         )
 
     @property
+    def is_run(self) -> bool:
+        """Whether the engine would be started."""
+        if self.status == "finished":
+            return self.again
+        return self.status != "running"
+
+    @property
     def _task(self) -> str:
         """What would be done, with the predicted time."""
-        if self.status == "finished":
-            return "nothing: the result is printed"
         if self.status == "running":
             return "nothing: another process is running it"
-        verb = "continue the run" if self.status == "interrupted" else "run"
+        if not self.is_run:
+            return "nothing: the result is printed"
+        verb = "run"
+        if self.status == "interrupted":
+            verb = "continue the run"
+        elif self.again:
+            verb = "run again and replace the result"
         return f"{verb}, predicted {duration_text(self.seconds)}"
 
 
@@ -92,17 +106,17 @@ def plan_run(named: Reference, engine: str | None = None, *, force: bool = False
     place = named.path
     if named.kind != "run" or named.changes:
         place = run_place(case, find_engine(engine), named.folder)
-    if is_finished(place) and not force:
-        return RunPlan(case, place, "finished", run_text(place), 0.0)
-    state = state_at(place)
     seconds = PROGRAM_SECONDS + predicted_seconds(case) + predicted_overhead([case])
+    if is_finished(place):
+        missing_seconds = seconds if force else 0.0
+        return RunPlan(case, place, "finished", run_text(place), missing_seconds, again=force)
+    state = state_at(place)
     share = None if force else share_kept(place)
     if state.status == "missing" and share is not None:
         return RunPlan(
             case, place, "interrupted", f"interrupted, {state.message}", seconds * (1.0 - share)
         )
-    status = "missing" if state.status == "finished" else state.status
-    return RunPlan(case, place, status, _status_text(status, state.message), seconds)
+    return RunPlan(case, place, state.status, _status_text(state.status, state.message), seconds)
 
 
 def _status_text(status: str, message: str | None) -> str:

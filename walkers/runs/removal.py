@@ -125,9 +125,11 @@ def removal_text(removals: Sequence[Removal]) -> str:
     """What is to be removed, and its total size.
 
     Each of the first `_MOST_LINES` removals has a line with the time since its last change. Of a
-    symbolic link, only the link is removed, which has no size.
+    symbolic link, only the link is removed, which has no size. The total counts a draw in the
+    directory of a spread that is removed too once.
     """
     now = time.time()
+    removed_paths = {removal.path for removal in removals}
     lines = []
     numbers = Counter[str]()
     total = 0
@@ -138,7 +140,8 @@ def removal_text(removals: Sequence[Removal]) -> str:
         age = duration_text(max(now - changed, 0.0))
         lines.append([removal.path.name, removal.label, age, bytes_text(size), removal.remark])
         numbers[removal.label] += 1
-        total += size
+        if removed_paths.isdisjoint(removal.path.parents):
+            total += size
     texts = []
     if lines:
         texts.append(aligned(lines[:_MOST_LINES]))

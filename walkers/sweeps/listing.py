@@ -99,6 +99,8 @@ def without_members(contents: Sequence[ListEntry]) -> list[ListEntry]:
     for sweep in contents:
         members.update(sweep.runs or ())
     for entry in contents:
+        if _is_in_companion(entry):  # a draw of now or of an earlier number of draws
+            members.add(entry.name)
         if entry.requested:
             members.discard(entry.name)
     left = [entry for entry in contents if entry.name not in members]
@@ -114,9 +116,17 @@ def without_draws(contents: Sequence[ListEntry]) -> list[ListEntry]:
             draws.update(entry.runs or ())
         else:
             asked_for.update(entry.runs or ())
+        if _is_in_companion(entry):
+            draws.add(entry.name)
         if entry.requested:
             asked_for.add(entry.name)
     return [entry for entry in contents if entry.name not in draws - asked_for]
+
+
+def _is_in_companion(entry: ListEntry) -> bool:
+    """Whether a run is in the directory of a spread or an accuracy."""
+    folder, _, _ = entry.name.rpartition("/")
+    return bool(run_of_sweep(folder))
 
 
 def as_json(contents: Sequence[ListEntry]) -> list[dict[str, Any]]:

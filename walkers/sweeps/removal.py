@@ -16,8 +16,8 @@ from walkers.sweeps.record import RECORD_NAME, read_sweep_record
 def removals_in(out: Path, places: Sequence[Path]) -> list[Removal]:
     """The removals of runs and sweeps in a folder of runs.
 
-    Removing a sweep also removes the runs that no other sweep has; removing a run also removes its
-    spread and its accuracy.
+    Removing a sweep also removes the runs that no other sweep has and that were not asked for by
+    themselves; removing a run also removes its spread and its accuracy.
 
     Parameters
     ----------
@@ -45,7 +45,13 @@ def removals_in(out: Path, places: Sequence[Path]) -> list[Removal]:
     for entry in contents:
         if entry.kind == "sweep":
             runs_of_sweeps[entry.name] = entry.runs or ()
-    removed = _with_members(names, runs_of_sweeps)
+    asked_for = set()
+    for entry in contents:
+        # A draw in the directory of a spread is removed with it, whoever asked for it.
+        is_in_sweep = "/" in entry.name
+        if entry.requested and not is_in_sweep:
+            asked_for.add(entry.name)
+    removed = _with_members(names, runs_of_sweeps, asked_for)
     members = removed - names
     removals = []
     for entry in contents:
@@ -72,7 +78,9 @@ def _entries_at(place: Path, contents: Sequence[ListEntry]) -> list[ListEntry]:
 
 
 def _with_members(
-    names: Collection[str], runs_of_sweeps: Mapping[str, Collection[str]]
+    names: Collection[str],
+    runs_of_sweeps: Mapping[str, Collection[str]],
+    asked_for: Collection[str],
 ) -> set[str]:
     """Names of runs and sweeps, with the names of what is removed with them.
 
@@ -82,10 +90,12 @@ def _with_members(
         Names of runs and sweeps.
     runs_of_sweeps
         Names of the runs of all sweeps in the folder, by the names of the sweeps.
+    asked_for
+        Names of runs that were asked for by themselves, which no sweep takes with it.
     """
     removed = set(names)
     while True:
-        needed: set[str] = set()
+        needed = set(asked_for)
         members: set[str] = set()
         for sweep, runs in runs_of_sweeps.items():
             if sweep in removed:

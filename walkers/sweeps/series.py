@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from walkers.arrays import FloatArray
 from walkers.postprocess.measure.quantities import LABELS, scatter_of
 from walkers.postprocess.show.drawing import errors_seen, plain_text
 from walkers.sweeps.factors import Factor, number_factor
@@ -229,15 +230,38 @@ def draw_series(
 
 
 def _draw_band(axes: Axes, series: Series, shown: pd.DataFrame, colour: Any) -> None:
-    """The band of a line, or a thick bar at each point."""
-    low = shown["low"].to_numpy()
-    high = shown["high"].to_numpy()
+    """The band of a line, and a thick bar at each point that is not on it.
+
+    Points on a line whose neighbours have no band are not on its band.
+    """
+    low = shown["low"].to_numpy(dtype=float)
+    high = shown["high"].to_numpy(dtype=float)
+    has_bar = np.isfinite(low)
     if series.is_line:
         axes.fill_between(
             series.places, low, high, color=colour, alpha=_BAND_OPACITY, zorder=0.5, lw=0.0
         )
-    else:
-        axes.vlines(series.places, low, high, color=colour, alpha=_BAND_OPACITY, zorder=0.5, lw=4.0)
+        has_bar &= ~_has_finite_neighbour(low)
+    if not has_bar.any():
+        return
+    axes.vlines(
+        series.places[has_bar],
+        low[has_bar],
+        high[has_bar],
+        color=colour,
+        alpha=_BAND_OPACITY,
+        zorder=0.5,
+        lw=4.0,
+    )
+
+
+def _has_finite_neighbour(numbers: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whether the number before or after each number is finite, shape (N,)."""
+    is_finite = np.isfinite(numbers)
+    has_neighbour = np.zeros_like(is_finite)
+    has_neighbour[1:] |= is_finite[:-1]
+    has_neighbour[:-1] |= is_finite[1:]
+    return has_neighbour
 
 
 def own_styles(labels: Sequence[str], colours: Colours) -> list[Style]:

@@ -49,6 +49,7 @@ from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.scheduler import SweepOptions, SweepPlan, plan_sweep, run_sweep
 from walkers.sweeps.table import main_columns, table_of, walking_points
 from walkers.sweeps.workers import Failure
+from walkers.warning import warn_user
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -296,13 +297,20 @@ def run_spread(  # noqa: PLR0913
     EngineFailure, SweepStopped
         As by `walkers.sweeps.scheduler.run_sweep`.
 
+    Warns
+    -----
+    UserWarning
+        If the band of more draws is replaced. These draws are kept.
+
     Notes
     -----
     Values are drawn independently. Calibrated values are correlated
     (docs/explanation/calibration.md): for them, the band is wider than that of the posterior.
     """
+    sweep = spread_sweep(case, points, engine)
+    _warn_of_fewer_draws(out / sweep.name, case.name, points)
     record, failures = run_sweep(
-        spread_sweep(case, points, engine),
+        sweep,
         out,
         _options_of_draws(options),
         engine=engine,
@@ -315,6 +323,30 @@ def run_spread(  # noqa: PLR0913
     contents = {**spread.as_dict(), "directory": record.directory.name}
     write_json(record.directory / SPREAD_NAME, contents)
     return spread
+
+
+def _warn_of_fewer_draws(directory: Path, case_name: str, points: int) -> None:
+    """Warn if the band of so many draws replaces one of more draws.
+
+    Parameters
+    ----------
+    directory
+        Directory of the spread.
+    case_name
+        Name of the case.
+    points
+        Number of draws.
+    """
+    try:
+        bands = read_json(directory / SPREAD_NAME)["bands"].values()
+        points_before = len(read_sweep_record(directory).runs)
+    except (InputError, OSError, ValueError, KeyError, TypeError, AttributeError):
+        return  # there is no band, or it cannot be read
+    if bands and points_before > points:
+        warn_user(
+            f"{case_name}: the band of {points} draws replaces that of {points_before} draws, "
+            f"which are kept: {points_before} points give their band again"
+        )
 
 
 def spread_in(

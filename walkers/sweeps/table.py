@@ -493,14 +493,16 @@ def cells_of(
     cells : pandas.DataFrame
         Texts, with the units in the headings.
     same : str
-        The results that are the same at all points of a sweep, which have no column.
+        The results that are the same at all finished points of a sweep, which have no column.
     """
     import pandas as pd
 
     names = _printed_columns(frame)
     varied = frame.attrs["varied"]
     always = set(names)
+    with_results = frame
     if "status" in names:  # not in a table of thresholds
+        with_results = frame[frame["status"] == "finished"]
         always = {"point", *varied, *main_columns(frame)}
     short = dict(zip(varied, short_keys(varied, names), strict=True))
     cells = {}
@@ -509,7 +511,8 @@ def cells_of(
         heading = heading_of(name) if heading_of else short.get(name, name)
         texts, unit = _column_texts(frame, name)
         different = set(texts) - {"-", ""}
-        if name in always or len(different) > 1:
+        is_everywhere = bool(with_results[name].notna().all())
+        if name in always or len(different) > 1 or (different and not is_everywhere):
             cells[with_unit(heading, unit)] = texts
         elif different and name != "status":
             same.append(f"{heading} {different.pop()} {unit}".rstrip())
