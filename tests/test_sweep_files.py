@@ -27,6 +27,7 @@ from walkers.inputs.resolving.library import unmeasured
 from walkers.inputs.resolving.loads import dimer_of
 from walkers.inputs.sweep import SweepDefinition, expand, load_sweep
 from walkers.inputs.tables.case import Case
+from walkers.inputs.tables.materials import FrictionLaw
 from walkers.postprocess.measure import meetings
 from walkers.postprocess.measure.dump import DumpError
 from walkers.postprocess.measure.numbers import band_text
@@ -580,6 +581,16 @@ def test_a_key_may_be_a_number_at_some_points_and_a_table_at_others(
     words = "at_rest = 0.28, rise = 0.3, half_rise_velocity = 3.6 mm/s"
     assert list(table["contact.friction.bead_wall"]) == [0.5, words, 0.5, words]
     assert [len(rows) for _, rows in seed_groups(table)] == [2, 2]
+
+
+def test_a_table_in_set_takes_the_place_of_the_number_of_the_case(make_sweep: MakeSweep) -> None:
+    growing = {"at_rest": 0.28, "rise": 0.3, "half_rise_velocity": "3.6 mm/s"}
+    sweep = make_sweep(
+        set={"contact": {"friction": {"bead_wall": growing}}},
+        axes={"drive": {"frequency": ["90 Hz", "80 Hz"]}},
+    )
+    law = FrictionLaw(at_rest=0.28, rise=0.3, half_rise_velocity=0.0036)
+    assert [case.contact.friction.bead_wall for case in sweep.cases()] == [law, law]
 
 
 @pytest.fixture
