@@ -25,6 +25,7 @@ from walkers.sweeps.climbing import (
     PARTS,
     climb_summary,
     conditions_in,
+    dispersion,
     leaders,
     survival,
 )
@@ -229,17 +230,35 @@ def test_the_dispersion_is_the_variance_over_the_mean_of_the_climbs_of_a_run(
     assert statistics["dispersion"] == pytest.approx(dispersion)
 
 
-@pytest.mark.parametrize(("shortest", "has_dispersion"), [(9.1, True), (8.9, False)])
-def test_runs_whose_lengths_differ_by_more_than_a_tenth_have_no_dispersion(
-    shortest: float, has_dispersion: bool
-) -> None:
-    """Numbers of climbs of runs of different lengths vary even if climbs are as frequent."""
-    statistics = climb_summary(PILES.assign(driven=[10.0, 10.0, 10.0, shortest]), CLIMBS)
-    assert (statistics["dispersion"] is not None) == has_dispersion
+def test_runs_of_different_lengths_are_expected_to_have_climbs_in_proportion() -> None:
+    """Of 10, 10, 5 and 5 s: 1, 1, 1/2 and 1/2 are expected, and 2, 1, 0, 0 were seen."""
+    statistics = climb_summary(PILES.assign(driven=[10.0, 10.0, 5.0, 5.0]), CLIMBS)
+    assert statistics["dispersion"] == pytest.approx((1.0 + 0.0 + 0.5 + 0.5) / 3.0)
+
+
+def test_the_interval_of_the_dispersion_is_by_chi_square(summary: dict[str, Any]) -> None:
+    """The tabulated quantiles of χ² of three degrees of freedom are 0.2158 and 9.3484."""
+    low, high = summary["dispersion_interval"]
+    assert low == pytest.approx(3.0 * summary["dispersion"] / 9.3484, rel=1e-4)
+    assert high == pytest.approx(3.0 * summary["dispersion"] / 0.2158, rel=1e-3)
+
+
+def test_the_interval_of_the_dispersion_covers_one_in_95_of_100_ensembles() -> None:
+    """Of thirty runs of 10 s with 3 independent climbs each; 2,000 ensembles, 2.8 deviations."""
+    numbers = np.random.default_rng(1).poisson(3.0, (2000, 30))
+    piles = pd.DataFrame({"driven": [10.0] * 30})
+    covered = 0
+    for ensemble in numbers:
+        climbs = pd.DataFrame({"pile": np.repeat(np.arange(30), ensemble)})
+        low, high = dispersion(climbs, piles["driven"])["dispersion_interval"]
+        covered += low <= 1.0 <= high
+    assert covered / len(numbers) == pytest.approx(0.95, abs=0.014)
 
 
 def test_piles_without_climbs_have_no_dispersion() -> None:
-    assert climb_summary(PILES[2:], NO_CLIMBS)["dispersion"] is None
+    statistics = climb_summary(PILES[2:], NO_CLIMBS)
+    assert statistics["dispersion"] is None
+    assert statistics["dispersion_interval"] is None
 
 
 # --- first climbs of runs of one length -------------------------------------------------------
@@ -497,6 +516,14 @@ def test_labels_of_a_pile_are_dealt_without_replacement() -> None:
     assert statistics["p_among_beads"] == pytest.approx(1.0 / 3.0, abs=0.02)
 
 
+def test_the_share_of_large_leaders_has_clopper_and_pearsons_interval(
+    summary: dict[str, Any],
+) -> None:
+    """Two of three, as tabulated."""
+    assert summary["share_led_by_large"] == pytest.approx(2.0 / 3.0)
+    assert summary["share_led_by_large_interval"] == pytest.approx([0.0943, 0.9916], abs=6e-5)
+
+
 def test_a_bead_that_leads_twice_counts_twice_in_each_deal() -> None:
     """It is large with the probability 4/20, and then so are both leaders."""
     statistics = leaders(PILES, CLIMBS[1:2].iloc[[0, 0]])
@@ -512,6 +539,8 @@ def test_a_bead_that_leads_twice_counts_twice_in_each_deal() -> None:
         ("climbed", "2 of 4"),
         ("half by (s)", "4"),
         ("led by large", "2 of 3"),
+        ("share led by large", "0.67 (0.09 to 0.99)"),
+        ("dispersion", "1.2 (0.39 to 17)"),
         ("beads", "2 to 4"),
         ("rate", "0.075 (0.015 to 0.22)"),
         ("in corners", "0.025 (0.00063 to 0.14)"),
@@ -532,6 +561,7 @@ def test_statistics_are_printed_in_their_units(
     [
         ("climbed", "0 of 4"),
         ("led by large", "0 of 0"),
+        ("share led by large", "–"),
         ("p by chance", "–"),
         ("dispersion", "–"),
         ("half by (s)", "–"),

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 CONFIDENCE = 0.95
 """Confidence level of all intervals."""
+_TAIL = (1.0 - CONFIDENCE) / 2.0
+"""Probability that each end of an interval leaves out."""
 DRAWS = 10_000
 """Number of random permutations in the test of the leaders."""
 PARTS = ("on_plain_walls", "in_corners", "out_of_pile")
@@ -37,8 +39,6 @@ WALLS_OF_CORNER = 2
 """Smallest number of side walls that hold a climb in a corner."""
 _SAME_LENGTH = 1e-6
 """Relative difference below which two lengths of runs are equal."""
-_SIMILAR_LENGTHS = 0.1
-"""Largest difference of the lengths of runs, relative to the longest, for a dispersion."""
 
 
 def conditions_in(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
@@ -210,8 +210,8 @@ def climb_statistics(
         - ``climbs``: number of climbs
         - ``rate``, ``rate_interval``: climbs of a run per time, 1/s, with the exact Poisson
           interval
-        - ``dispersion``: variance over mean of the number of climbs of a run; None if the lengths
-          of runs differ by more than a tenth
+        - ``dispersion``, ``dispersion_interval``: variance over mean of the number of climbs of a
+          run, with its interval; 1 if climbs are independent
         - ``times``, ``onsets``: when the first climbs of runs qualified and began, s
         - ``speeds`` (m/s), ``heights`` (m, of the leaders at the end) and ``sizes`` (beads) of all
           climbs
@@ -228,7 +228,7 @@ def climb_statistics(
         **survival(np.array(first, dtype=float), np.array(watched, dtype=float), deadline),
         "climbs": len(counted),
         **_rate(len(counted), seconds),
-        "dispersion": _dispersion(counted, watched),
+        **dispersion(counted, watched),
         "times": firsts["qualified"].tolist(),
         "onsets": firsts["onset"].tolist(),
         "speeds": counted["speed"].dropna().tolist(),
@@ -238,16 +238,41 @@ def climb_statistics(
     }
 
 
-def _dispersion(climbs: pd.DataFrame, watched: pd.Series) -> float | None:
-    """Variance over mean of the number of climbs of a run: 1 if climbs are independent.
+def dispersion(climbs: pd.DataFrame, watched: pd.Series) -> dict[str, Any]:
+    """Variance over mean of the number of climbs of a run, with its 95 % interval.
 
-    None without climbs, for one run, or if the lengths of the runs are too different.
+    Parameters
+    ----------
+    climbs
+        A row per climb, with the index of its ``pile``.
+    watched
+        Time of drive of each run, s.
+
+    Returns
+    -------
+    dict
+        ``dispersion`` and ``dispersion_interval``; None without climbs, or for one run.
+
+    Notes
+    -----
+    It is Pearson's statistic over its N - 1 degrees of freedom, so that N runs may differ in their
+    lengths: each is expected to have climbs in proportion to its length. The statistic over the
+    true dispersion has about the distribution χ² (McCullagh and Nelder 1989, section 6.2.4).
     """
-    are_similar = np.ptp(watched) <= _SIMILAR_LENGTHS * watched.max()
-    if not are_similar or len(watched) < 2 or climbs.empty:
-        return None
+    from scipy.stats import chi2
+
+    watched = watched[watched > 0.0]
+    freedom = len(watched) - 1
+    if climbs.empty or freedom < 1:
+        return {"dispersion": None, "dispersion_interval": None}
     numbers = climbs["pile"].value_counts().reindex(watched.index, fill_value=0)
-    return float(numbers.var() / numbers.mean())
+    expected = watched * len(climbs) / watched.sum()
+    statistic = float(((numbers - expected) ** 2 / expected).sum())
+    low, high = statistic / chi2.ppf([1.0 - _TAIL, _TAIL], freedom)
+    return {
+        "dispersion": statistic / freedom,
+        "dispersion_interval": [float(low), float(high)],
+    }
 
 
 def _rate(events: int, seconds: float) -> dict[str, Any]:
@@ -256,11 +281,10 @@ def _rate(events: int, seconds: float) -> dict[str, Any]:
 
     if seconds <= 0.0:
         return {"rate": None, "rate_interval": None}
-    tail = (1.0 - CONFIDENCE) / 2.0
     fewest = 0.0
     if events:
-        fewest = chi2.ppf(tail, 2 * events) / 2.0
-    most = chi2.ppf(1.0 - tail, 2 * events + 2) / 2.0
+        fewest = chi2.ppf(_TAIL, 2 * events) / 2.0
+    most = chi2.ppf(1.0 - _TAIL, 2 * events + 2) / 2.0
     return {
         "rate": events / seconds,
         "rate_interval": [float(fewest / seconds), float(most / seconds)],
@@ -278,15 +302,20 @@ def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``led_by_large``, the number of climbs that a large bead leads; ``share_of_large``, the
-        share of large beads in all runs; ``p_among_beads``, the one-sided probability of at least
-        as many climbs that large beads lead if the labels "large" and "small" are permuted within
-        each run, from 10,000 draws. It is None without climbs.
+        - ``led_by_large``: number of climbs that a large bead leads
+        - ``share_led_by_large``, ``share_led_by_large_interval``: their share of the climbs, with
+          the exact interval (Clopper and Pearson 1934); None without climbs
+        - ``share_of_large``: share of large beads in all runs
+        - ``p_among_beads``: one-sided probability of at least as many climbs that large beads lead
+          if the labels "large" and "small" are permuted within each run, from 10,000 draws; None
+          without climbs
 
     Notes
     -----
     Climbs of one run are not independent: a bead that leads twice counts twice in each draw.
     """
+    from scipy.stats import binomtest
+
     generator = np.random.default_rng(0)
     led_by_large = int(climbs["leader_large"].sum())
     drawn = np.zeros(DRAWS)
@@ -299,10 +328,17 @@ def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:
             drawn += number * is_large
             large_left -= is_large
     probability = None
+    share = None
+    interval = None
     if len(climbs):
         probability = float((1 + (drawn >= led_by_large).sum()) / (1 + DRAWS))
+        share = led_by_large / len(climbs)
+        ends = binomtest(led_by_large, len(climbs)).proportion_ci(CONFIDENCE)
+        interval = [float(ends.low), float(ends.high)]
     return {
         "led_by_large": led_by_large,
+        "share_led_by_large": share,
+        "share_led_by_large_interval": interval,
         "share_of_large": float(piles["large"].sum() / piles["beads"].sum()),
         "p_among_beads": probability,
     }

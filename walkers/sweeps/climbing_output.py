@@ -96,8 +96,11 @@ def texts_of(climbs: Mapping[str, Any]) -> dict[str, str]:
         rate = _with_interval(climbs[part]["rate"], climbs[part]["rate_interval"], ".2g")
         texts[part.replace("_", " ")] = rate
     texts |= {
-        "dispersion": _two_digits(climbs["dispersion"]),
+        "dispersion": _with_interval(climbs["dispersion"], climbs["dispersion_interval"], ".2g"),
         "led by large": f"{climbs['led_by_large']} of {climbs['climbs']}",
+        "share led by large": _with_interval(
+            climbs["share_led_by_large"], climbs["share_led_by_large_interval"], ".2f"
+        ),
         "large beads (%)": f"{100.0 * climbs['share_of_large']:.0f}",
         "p by chance": _two_digits(p_by_chance),
         "beads": _range_text(climbs["sizes"]),
