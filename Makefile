@@ -98,12 +98,8 @@ joss: pandoc ## Build the paper about the program (docs/joss/paper.md) into buil
 	@echo "open build/joss.html"
 
 .PHONY: bench
-bench: setup .venv/with-dev ## Measure what docs/explanation/performance.md states
+bench: setup codes .venv/with-dev ## Measure the speeds of docs/explanation/performance.md, beside Debian's LAMMPS and YADE
 	.venv/bin/python -m tests.benchmark
-
-.PHONY: bench-codes
-bench-codes: setup codes .venv/with-dev ## Measure what docs/explanation/other-codes.md states, beside Debian's LAMMPS and YADE
-	.venv/bin/python -m tests.benchmark_codes
 
 .PHONY: clean
 clean: ## Remove the environment and caches, never the runs

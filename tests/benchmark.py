@@ -1,201 +1,376 @@
-"""Measure what docs/explanation/performance.md states: ``make bench`` prints its table.
+"""Measure the speeds in docs/explanation/performance.md: ``make bench`` prints their table.
 
-Times depend on the machine, so the ratios within one call are what counts. Decks of a pile with the
-stock engine's capillary model run in turn with today's. Both begin with the same beads, from the
-end of a shaken run.
+The same beads, from the end of a shaken pile, in liggghts and in Debian's lammps and yade: with the
+same sizes, density, walls, drive and time step, on one core. Codes run in turn, several times.
+
+Beads at rest must touch as many neighbours in each code, or the comparison is of unlike piles.
+Without adhesion, beads that bridges had pressed together spring apart, and a dry pile would be
+timed in flight. Dry piles are therefore settled first, by their own code, until they lie.
 """
 
 from __future__ import annotations
 
-import json
-import os
 import re
-import resource
-import subprocess
+import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import atan
 from pathlib import Path
 from statistics import median
 
-import walkers
+import numpy as np
+from scipy.spatial import cKDTree
+
+from tests.benchmark_decks import (
+    ENGINE,
+    compose_for_stock,
+    compose_from,
+    cpu_time,
+    environment,
+    minimal,
+    shaken,
+    without_steps,
+)
+from walkers.arrays import FloatArray
 from walkers.inputs.reading import load_case
 from walkers.inputs.tables.case import Case
-from walkers.runner.binary import find_engine
-from walkers.runner.compiled_model import plugin_of
-from walkers.runner.process import ALONE
+from walkers.physics.capillary import bead_volume
+from walkers.postprocess.measure.dump import BinaryDump
 from walkers.runner.run_directory import write_deck
-from walkers.templates import deck as deck_module
-from walkers.templates.deck import Deck, Segment, compose, plan_of
+from walkers.templates.deck import Deck
+from walkers.templates.layout import BEAD_COLUMNS
 from walkers.templates.placement import Bead
 
-REPEATS = 3
-RATIOS = Path(__file__).with_name("benchmark_ratios.json")
-"""User CPU time of decks for the stock engine's model over that of today's, as last measured."""
-PILES = {"pile-200": "pile-small", "pile-1630": "pile-fig1a"}
-"""The case of each pile, by its name in the table."""
-STEPS = {"pile-200": 40_000, "pile-1630": 12_000}
-"""Number of timed steps of each pile."""
-ENGINE = ("liggghts", "-log", "none", "-in")
-SCRIPT = "script.py"
-_STOCK_MODEL = "gran model hertz tangential history cohesion easo/capillary/viscous"
-_STOCK_LIQUID = """
-fix tension all property/global surfaceTension scalar {liquid.surface_tension!r}
-fix angle all property/global contactAngle peratomtype 0.0 0.0
-fix content all property/global surfaceLiquidContentInitial scalar {liquid.volume_fraction!r}
-fix viscosity all property/global fluidViscosity scalar {liquid.viscosity!r}
-fix nearest all property/global minSeparationDistanceRatio scalar {ratio!r}
-fix farthest all property/global maxSeparationDistanceRatio scalar 1.2
+_REPEATS = 3
+"""Times that each code runs."""
+_STEPS = {"pile-small": 20_000, "pile-fig1a": 6_000}
+"""Number of timed steps of each case."""
+_SETTLING_STEPS = {"pile-small": 300_000, "pile-fig1a": 150_000}
+"""Steps after which dry beads lie at rest."""
+_SETTLED = "settled.restart"
+_END = "end.txt"
+_LAMMPS = ("lmp", "-log", "none", "-in")
+_YADE = ("yade", "-n", "-x", "-j", "1")
+_LAMMPS_PILE = """
+units si
+atom_style sphere
+boundary f f f
+newton off
+comm_modify vel yes
+{start}
+neighbor 2e-4 bin
+neigh_modify delay 0
+{contacts}
+variable down equal {gravity}-{peak}*sin(2*PI*{frequency}*step*{dt})
+fix gravity all gravity v_down vector 0 0 -1
+fix motion all nve/sphere
+timestep {dt}
+run STEPS
+write_dump all custom {end} x y z modify sort id format float %.17g
+"""
+_SETTLE_AND_KEEP = f"""
+write_restart {_SETTLED}
+"""
+_GRANULAR = """
+pair_style granular
+pair_coeff * * {law}
+fix x all wall/gran granular {law} xplane -{half} {half}
+fix y all wall/gran granular {law} yplane -{half} {half}
+fix z all wall/gran granular {law} zplane 0 NULL
+"""
+_HISTORY = """
+pair_style gran/hertz/history {law}
+pair_coeff * *
+fix x all wall/gran hertz/history {law} xplane -{half} {half}
+fix y all wall/gran hertz/history {law} yplane -{half} {half}
+fix z all wall/gran hertz/history {law} zplane 0 NULL
+"""
+_YADE_PILE = """
+from yade import *
+import numpy
+liquid = dict(Capillar=True, CapillarType="Rabinovich", Vb={bridge}, gamma={tension}, theta=0.0)
+material = ViscElCapMat(
+    density={density}, frictionAngle={angle}, tc=4e-5, en={e}, et={e}, **liquid
+)
+O.materials.append(material)
+swing = {peak} / (2.0 * numpy.pi * {frequency})
+for x, y, z, radius, vx, vy, vz, wx, wy, wz in numpy.loadtxt("beads.txt"):
+    bead = sphere((x, y, z), radius, material=material)
+    bead.state.vel = (vx, vy, vz + swing)
+    bead.state.angVel = (wx, wy, wz)
+    O.bodies.append(bead)
+beads = list(O.bodies)
+planes = [(2, 0.0), (0, -{half}), (0, {half}), (1, -{half}), (1, {half})]
+walls = O.bodies.append([wall(place, axis, material=material) for axis, place in planes])
+shapes = [Bo1_Sphere_Aabb(aabbEnlargeFactor=1.2), Bo1_Wall_Aabb()]
+meetings = [Ig2_Sphere_Sphere_ScGeom(interactionDetectionFactor=1.2), Ig2_Wall_Sphere_ScGeom()]
+physics = [Ip2_ViscElCapMat_ViscElCapMat_ViscElCapPhys()]
+laws = [Law2_ScGeom_ViscElCapPhys_Basic()]
+shaking = HarmonicMotionEngine(
+    ids=walls,
+    A=(0, 0, swing / (2.0 * numpy.pi * {frequency})),
+    f=(0, 0, {frequency}),
+    fi=(0, 0, -numpy.pi / 2.0),
+)
+O.engines = [
+    ForceResetter(),
+    InsertionSortCollider(shapes),
+    InteractionLoop(meetings, physics, laws),
+    shaking,
+    NewtonIntegrator(damping=0.0, gravity=(0, 0, -{gravity})),
+]
+O.dt = {dt}
+if STEPS: O.run(STEPS, True)
+numpy.savetxt("{end}", [bead.state.pos for bead in beads])
 """
 
 
+@dataclass(frozen=True)
+class Script:
+    """How to run a code.
+
+    Attributes
+    ----------
+    command
+        The command, without its input file.
+    text
+        The input, with the word STEPS for the number of steps.
+    environment
+        The environment of the command.
+    settling
+        The input that settles the beads first, in the same folder; empty if they lie already.
+    """
+
+    command: tuple[str, ...]
+    text: str
+    environment: Mapping[str, str]
+    settling: str = ""
+
+
+@dataclass(frozen=True)
+class Start:
+    """The beads from which codes start, and how they are shaken.
+
+    Attributes
+    ----------
+    case
+        Name of the case of the pile.
+    beads
+        The beads.
+    peak
+        Peak acceleration of the drive, m/s²; None: that of the case.
+    """
+
+    case: str
+    beads: list[Bead]
+    peak: float | None = None
+
+
+@dataclass
+class Timing:
+    """What was measured of a code, a number for each repetition."""
+
+    speeds: list[float] = field(default_factory=list)
+    """Million bead-steps/s."""
+    neighbours: list[float] = field(default_factory=list)
+    """Touching neighbours of a bead at the end."""
+
+    def cells(self) -> str:
+        """The medians as cells of the table."""
+        return f"{median(self.speeds):.1f} | {median(self.neighbours):.1f} |"
+
+
 def main() -> None:
-    """Print the CPU time of a step in today's decks and in minimal ones, and record the ratios."""
-    ratios = {}
-    print("| deck | µs a step: minimal | today | bead-steps/s |\n|---|---|---|---|")
+    """Print bead-steps per second and touching neighbours at the end, shaken and at rest."""
+    shaken_columns = "shaken: M bead-steps/s | neighbours"
+    columns_at_rest = "at rest: M bead-steps/s | neighbours"
+    print(f"| code | beads | {shaken_columns} | {columns_at_rest} |")
+    print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
-        for name, case in PILES.items():
-            beads = shaken(case, Path(folder))
-            of_today, of_minimal = seconds_per_step(name, beads, Path(folder))
-            ratios[name] = {"minimal": round(of_minimal / of_today, 2)}
-            speed = len(beads) / of_today / 1e6
-            print(
-                f"| {name} | {1e6 * of_minimal:.1f} | {1e6 * of_today:.1f} | {speed:.1f} M |",
-                flush=True,
-            )
-    print(f"before: {RATIOS.read_text('utf-8')}")
-    RATIOS.write_text(json.dumps(ratios, indent=2) + "\n", encoding="utf-8")
+        for case in _STEPS:
+            _print_rows(case, Path(folder))
 
 
-def seconds_per_step(name: str, beads: list[Bead], folder: Path) -> tuple[float, float]:
-    """User CPU time of a step of a pile, s, in today's deck and in the minimal one.
+def _print_rows(case: str, folder: Path) -> None:
+    """Time all codes with a pile, shaken and at rest in turn, and print a row for each."""
+    beads = shaken(case, folder)
+    at_rest = [replace(bead, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0)) for bead in beads]
+    timings_shaken: dict[str, Timing] = {}
+    timings_at_rest: dict[str, Timing] = {}
+    for _ in range(_REPEATS):
+        _time_codes(Start(case, beads), folder / f"{case}-shaken", timings_shaken)
+        _time_codes(Start(case, at_rest, peak=0.0), folder / f"{case}-rest", timings_at_rest)
+    for code, timing in timings_shaken.items():
+        cells = f"{timing.cells()} {timings_at_rest[code].cells()}"
+        print(f"| {code} | {len(beads)} | {cells}", flush=True)
 
-    The two decks run in turn, several times; the times are medians.
+
+def _time_codes(start: Start, folder: Path, timings: dict[str, Timing]) -> None:
+    """Time each code once, and add its numbers to the timings by code."""
+    steps = _STEPS[start.case]
+    for code, script in scripts(start, steps, folder).items():
+        place = _place(folder, code)
+        _settle(script, place, _SETTLING_STEPS[start.case])
+        seconds = cpu_time(place, script.command, script.text, steps, script.environment)
+        timing = timings.setdefault(code, Timing())
+        timing.speeds.append(1e-6 * len(start.beads) * steps / seconds)
+        timing.neighbours.append(_neighbours(place, start.beads))
+
+
+def _place(folder: Path, code: str) -> Path:
+    """The folder of a code."""
+    return folder / re.sub(r"\W+", "-", code)
+
+
+def _settle(script: Script, place: Path, steps: int) -> None:
+    """Let the beads of a script come to rest, once."""
+    if script.settling and not (place / _SETTLED).is_file():
+        cpu_time(place, script.command, script.settling, steps, script.environment)
+
+
+def scripts(start: Start, steps: int, folder: Path) -> dict[str, Script]:
+    """Scripts of a pile for the codes that are installed, by the names of the codes.
+
+    Each code has its files in a folder of its own.
     """
-    case = PILES[name]
-    steps = STEPS[name]
-    today = compose_from(case, steps, beads)
-    stock = compose_for_stock(case, steps, beads)
-    stock = replace(stock, text=minimal(stock, load_case(case)))
-    seconds_of_today = []
-    seconds_of_stock = []
-    for number in range(REPEATS):
-        place = folder / f"{name}-{number}"
-        seconds_of_today.append(_seconds(today, steps, place / "today", is_stock=False))
-        seconds_of_stock.append(_seconds(stock, steps, place / "minimal", is_stock=True))
-    return median(seconds_of_today) / steps, median(seconds_of_stock) / steps
+    case = load_case(start.case)
+    values = _values(case, start.peak)
+    deck = compose_from(start.case, steps, start.beads)
+    by_code = _scripts_of_liggghts(deck, start, steps, values)
+    if shutil.which(_LAMMPS[0]):
+        by_code |= _scripts_of_lammps(values, is_at_rest=start.peak == 0.0)
+    if shutil.which(_YADE[0]):
+        by_code["yade: Rabinovich"] = Script(_YADE, _YADE_PILE.format(**values), {})
+    for code in by_code:
+        place = _place(folder, code)
+        place.mkdir(parents=True, exist_ok=True)
+        write_deck(deck, place)
+        _write_beads(place, start.beads, case)
+    return by_code
 
 
-def _seconds(deck: Deck, steps: int, place: Path, *, is_stock: bool) -> float:
-    """User CPU time of the steps of a deck, s."""
-    place.mkdir(parents=True)
-    write_deck(deck, place)
-    return cpu_time(place, ENGINE, without_steps(deck.text), steps, environment(stock=is_stock))
+def _scripts_of_liggghts(
+    deck: Deck, start: Start, steps: int, values: Mapping[str, float | str]
+) -> dict[str, Script]:
+    """The deck of this project, and one of the engine's own capillary model."""
+
+    def with_peak(text: str) -> str:
+        peak = rf"\g<1> {values['peak']!r}"
+        return without_steps(re.sub(r"(peak_acceleration string) \S+", peak, text))
+
+    stock_deck = compose_for_stock(start.case, steps, start.beads)
+    stock_text = minimal(stock_deck, load_case(start.case))
+    return {
+        "this project: Young–Laplace": Script(
+            ENGINE, with_peak(deck.text), environment(stock=False)
+        ),
+        "liggghts: easo": Script(ENGINE, with_peak(stock_text), environment(stock=True)),
+    }
 
 
-def environment(*, stock: bool) -> dict[str, str]:
-    """The environment of an engine of one process, without or with the contact model."""
-    if stock:
-        return dict(ALONE)
-    return ALONE | {"LD_PRELOAD": str(plugin_of(find_engine()))}
+def _scripts_of_lammps(values: Mapping[str, float | str], *, is_at_rest: bool) -> dict[str, Script]:
+    """The contact models of LAMMPS; dry beads at rest are settled first."""
+    material = "{modulus} {e} {poisson}".format(**values)
+    sliding = "tangential mindlin NULL 1.0 {friction} damping tsuji".format(**values)
+    adhesive_law = f"dmt {material} {values['tension']} {sliding}"
+    history_law = "{stiffness} NULL 3e9 NULL {friction} 1".format(**values)
+    contacts = {
+        "lammps: granular, DMT": _GRANULAR.format(law=adhesive_law, **values),
+        "lammps: granular, dry": _GRANULAR.format(
+            law=f"hertz/material {material} {sliding}", **values
+        ),
+        "lammps: hertz/history, dry": _HISTORY.format(law=history_law, **values),
+    }
+    by_code = {}
+    for code, commands in contacts.items():
+        script = _LAMMPS_PILE.format(start="read_data lammps.data", contacts=commands, **values)
+        settling = ""
+        if is_at_rest and code.endswith("dry"):
+            settling = script + _SETTLE_AND_KEEP
+            start = f"read_restart {_SETTLED}"
+            script = _LAMMPS_PILE.format(start=start, contacts=commands, **values)
+        by_code[code] = Script(_LAMMPS, script, environment(stock=True), settling)
+    return by_code
 
 
-def shaken(case: str, folder: Path, **settings: object) -> list[Bead]:
-    """Beads of a pile that has come to rest and was shaken for a tenth of a second."""
-    settings = {"run.ranks": 1, "run.duration": "0.1 s", "run.segment": "0.1 s"} | settings
-    motion = walkers.run(load_case(case, settings), folder / "starts").motion
-    position = motion.position[-1].tolist()
-    velocity = motion.velocity[-1].tolist()
-    spin = motion.spin[-1].tolist()
-    beads = []
-    for place, radius in enumerate(motion.radius.tolist()):
-        bead = Bead(
-            place + 1, tuple(position[place]), radius, tuple(velocity[place]), tuple(spin[place])
-        )
-        beads.append(bead)
-    return beads
+def _values(case: Case, peak: float | None) -> dict[str, float | str]:
+    """Numbers that the scripts contain, in SI units; a peak of None is that of the case."""
+    (harmonic,) = case.excitation.harmonics
+    if peak is None:
+        peak = harmonic.peak_acceleration
+    contact = case.contact
+    reduced = contact.youngs_modulus / (2.0 * (1.0 - contact.poissons_ratio**2))
+    return {
+        "modulus": contact.youngs_modulus,
+        "poisson": contact.poissons_ratio,
+        "stiffness": 4.0 / 3.0 * reduced,
+        "e": contact.restitution,
+        "friction": contact.friction.bead_bead,
+        "angle": atan(contact.friction.bead_bead),
+        "tension": case.liquid.surface_tension,
+        "bridge": case.liquid.of_bridges.volume_fraction * bead_volume(min(case.radii)),
+        "density": case.beads.density,
+        "half": 0.5 * case.boundary.width,
+        "gravity": case.environment.gravity,
+        "peak": peak,
+        "frequency": harmonic.frequency,
+        "dt": case.run.time_step,
+        "end": _END,
+    }
 
 
-def compose_from(case: str, steps: int, beads: list[Bead], **settings: object) -> Deck:
-    """Today's deck of a pile from given beads, without frames between its ends."""
-    plan = plan_of(load_case(case, {"run.ranks": 1} | settings), segment=Segment(0, steps, 0))
-    scene = replace(plan.scene, beads=tuple(beads))
-    return compose(replace(plan, scene=scene, sample_every=steps, bridge_every=steps))
+def _write_beads(place: Path, beads: list[Bead], case: Case) -> None:
+    """The beads as files for LAMMPS and YADE."""
+    rows = [(*bead.centre, bead.radius, *bead.velocity, *bead.spin) for bead in beads]
+    np.savetxt(place / "beads.txt", rows, fmt="%.17g")
+    half = 0.5 * case.boundary.width + 2e-4
+    top = max(bead.centre[2] for bead in beads) + case.boundary.height
+    lines = [
+        "beads",
+        "",
+        f"{len(beads)} atoms",
+        "1 atom types",
+        "",
+        f"-{half} {half} xlo xhi",
+        f"-{half} {half} ylo yhi",
+        f"-2e-4 {top} zlo zhi",
+        "",
+        "Atoms # sphere",
+        "",
+    ]
+    for bead in beads:
+        lines.append(_row(bead.id, 1, 2.0 * bead.radius, case.beads.density, *bead.centre))
+    lines += ["", "Velocities", ""]
+    for bead in beads:
+        lines.append(_row(bead.id, *bead.velocity, *bead.spin))
+    (place / "lammps.data").write_text("\n".join(lines) + "\n", "utf-8")
 
 
-def compose_for_stock(case: str, steps: int, beads: list[Bead]) -> Deck:
-    """The deck of `compose_from` with beads that commands create.
-
-    At primitive walls, the stock model reads memory before the velocities of the beads. After
-    ``read_data`` there is none, and the engine dies.
-    """
-    most_created = deck_module.MOST_CREATED
-    deck_module.MOST_CREATED = len(beads)
-    try:
-        return compose_from(case, steps, beads)
-    finally:
-        deck_module.MOST_CREATED = most_created
+def _row(*numbers: float) -> str:
+    """Numbers with all digits."""
+    return " ".join(map(repr, numbers))
 
 
-def minimal(deck: Deck, case: Case) -> str:
-    """The deck with the stock engine's model and walls.
-
-    The walls are planes, each of which pulls half as much as a plane does.
-    """
-    text = re.sub(r"&\n *", " ", deck.text)
-    text = re.sub(r"(?m)^(dump|dump_modify) +(pairs|walls) .*\n", "", text)
-    commands = _wall_commands(text)
-    text = re.sub(r"(?m)^fix +walls all .*\n", "", text)
-    ratio = case.contact.roughness.bead_wall / case.radii[0]
-    liquid = _STOCK_LIQUID.format(liquid=case.liquid.of_bridges, ratio=ratio)
-    model = f"pair_style {_STOCK_MODEL}\n{liquid}"
-    text = re.sub(r"(?m)^pair_style .*\n", lambda _: model, text)
-    return re.sub(r"(?m)^fix +motion ", lambda match: commands + match[0], text)
+def _neighbours(place: Path, beads: list[Bead]) -> float:
+    """Mean number of touching neighbours of a bead at the end of the last run."""
+    centres = _centres_at_end(place, len(beads))
+    radii = np.array([bead.radius for bead in beads])
+    pairs = cKDTree(centres).query_pairs(2.0 * radii.max(), output_type="ndarray")
+    first, second = pairs.T
+    distances = np.linalg.norm(centres[first] - centres[second], axis=1)
+    touching = np.count_nonzero(distances < radii[first] + radii[second])
+    return 2.0 * touching / len(beads)
 
 
-def _wall_commands(text: str) -> str:
-    """Commands that replace the walls of a deck by primitive ones, and shaking by gravity."""
-    commands = ""
-    # The planes of a deck: a point, and the normal, along x, y or z.
-    planes = re.findall(r"plane (\S+) (\S+) (\S+)  (\S+) (\S+) (\S+)", text)
-    for number, plane in enumerate(planes):
-        normal = [abs(float(component)) for component in plane[3:]]
-        axis = normal.index(max(normal))
-        kind = f"primitive type 2 {'xyz'[axis]}plane {plane[axis]}"
-        commands += f"fix wall_{number} all wall/gran {_STOCK_MODEL[5:]} {kind}\n"
-    acceleration = "${peak_acceleration}*sin(2*PI*${frequency}*${time_step}*step)"
-    commands += f"variable push equal {acceleration}\n"
-    commands += "fix push all gravity v_push vector 0.0 0.0 1.0\n"
-    commands += "fix gravity all gravity ${gravity} vector 0.0 0.0 -1.0\n"
-    return commands
-
-
-def without_steps(text: str) -> str:
-    """A deck with STEPS where its number of steps was."""
-    return re.sub(r"(?m)^run .*", "run STEPS", text)
-
-
-def cpu_time(
-    folder: Path, command: Sequence[str], text: str, steps: int, environment: Mapping[str, str]
-) -> float:
-    """User CPU time of steps of a script, s, without that of its start.
-
-    The script has the word STEPS for their number.
-    """
-    seconds = []
-    for number in (0, steps):
-        (folder / SCRIPT).write_text(text.replace("STEPS", str(number)), "utf-8")
-        before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
-        subprocess.run(
-            [*command, SCRIPT],
-            cwd=folder,
-            env={**os.environ, **environment},
-            capture_output=True,
-            check=True,
-        )
-        seconds.append(resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before)
-    start, start_and_steps = seconds
-    return start_and_steps - start
+def _centres_at_end(place: Path, count: int) -> FloatArray:
+    """Centres of the beads, m, shape (N, 3): the last lines of a text, or the last frame."""
+    end = place / _END
+    if end.exists():
+        lines = end.read_text("utf-8").splitlines()[-count:]
+        end.unlink()
+        return np.loadtxt(lines)
+    return BinaryDump(place / "beads.bin", BEAD_COLUMNS).stack()[-1][:, 3:6]
 
 
 if __name__ == "__main__":
