@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import subprocess
-from contextlib import chdir
+from contextlib import chdir, nullcontext
 from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
@@ -19,9 +19,11 @@ from tests.conftest import brief_pile, call, document, make_case, to_toml
 from tests.test_physics import OWN_LAW
 from walkers import run as run_case
 from walkers.arrays import FloatArray
+from walkers.errors import InputError
 from walkers.inputs.bridge_laws import by_name
 from walkers.inputs.case_building import build_case
 from walkers.inputs.reading import load_case, shipped
+from walkers.inputs.resolving.ranks import processor_grid
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.boundary import Boundary
 from walkers.inputs.tables.case import Case
@@ -38,7 +40,6 @@ from walkers.templates.deck import (
     _beads_data,
     compose,
     plan_of,
-    processor_grid,
     render_deck,
     settling_steps,
 )
@@ -237,9 +238,23 @@ def test_the_box_of_a_deck_has_room_for_beads_that_are_placed_far_from_the_origi
 def test_ranks_form_a_grid_with_short_cuts(
     ranks: int, width: float, depth: float, grid: tuple[int, int]
 ) -> None:
-    plan = plan_of(load_case("pile-ci"))
-    box = replace(plan.scene, lower=(0.0, 0.0, 0.0), upper=(width, depth, 9.0))
-    assert processor_grid(replace(plan, scene=box, ranks=ranks)) == grid
+    assert processor_grid(ranks, width, depth) == grid
+
+
+def test_a_deck_of_several_ranks_has_their_grid() -> None:
+    plan = plan_of(load_case("pile-ci", {"run.ranks": 2}))
+    deep = replace(plan.scene, lower=(0.0, 0.0, 0.0), upper=(0.01, 0.03, 0.09))
+    assert re.search(r"(?m)^processors +1 2 1$", compose(replace(plan, scene=deep)).text)
+
+
+@pytest.mark.parametrize(("ranks", "fits"), [(4, True), (8, False), (16, False)])
+def test_ranks_whose_parts_are_narrower_than_the_search_for_neighbours_are_refused(
+    ranks: int, fits: bool
+) -> None:
+    """The box of pile-ci is 4.4 mm wide: 2.2 mm for 2 by 2 ranks, 1.1 mm for 4 by 2 and 4 by 4."""
+    message = r"run\.ranks = \d+: expected fewer: .* 1\.1 mm wide, .* searched within 1\.4 mm"
+    with nullcontext() if fits else pytest.raises(InputError, match=message):
+        load_case("pile-ci", {"run.ranks": ranks})
 
 
 # --- bridges ----------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from walkers.arrays import Vector
 from walkers.errors import InputError, Problem
 from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.loads import bridge_at_rest, hop_height, path_length
+from walkers.inputs.resolving.ranks import SKIN, processor_grid
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.drive import AXES, Excitation
 from walkers.inputs.tables.materials import Contact
@@ -100,11 +101,6 @@ Each ``set atom`` walks through all atoms: 50,000 beads take 9 s, and 0.1 s from
 """
 _LEAST_NEIGHBOURS = 100
 """Smallest number of neighbours of a bead for which the engine has room."""
-_SKIN = 2e-4
-"""Search distance for neighbours beyond contact in piles, m.
-
-From 0.1 to 0.3 mm, the time per step changes by a few per cent.
-"""
 _MOST_BINS = 2e4
 """Number of bins of the neighbour search into which the box of a few beads is divided at most."""
 
@@ -375,7 +371,7 @@ def plan_of(*cases: Case, segment: Segment | None = None) -> Plan:
         restart_to=restart_to,
         restart_from=restart_from,
         fastest=max(fastest_of(sharing, scene) for sharing in cases),
-        skin=_SKIN if case.loose else None,  # loose beads are close to each other
+        skin=SKIN if case.loose else None,
     )
 
 
@@ -419,26 +415,6 @@ def fastest_of(case: Case, scene: PlacedBodies) -> float:
     fall_speed = sqrt(2.0 * case.environment.gravity * depth)
     bridge_speed = sqrt(2.0 * work / smallest_mass)
     return peak_velocities * case.excitation.peak_velocity + fall_speed + bridge_speed
-
-
-def processor_grid(plan: Plan) -> tuple[int, int]:
-    """Numbers of subdomains along x and y that need the shortest cuts through the box.
-
-    Each rank has a subdomain. The box is not cut along z: beads lie at its bottom, and ranks above
-    them would wait.
-    """
-    x_low, y_low, _ = plan.scene.lower
-    x_high, y_high, _ = plan.scene.upper
-    width = x_high - x_low
-    depth = y_high - y_low
-
-    def length_of_cuts(along_x: int) -> float:
-        """Length of all cuts with so many subdomains along x, m."""
-        return (along_x - 1) * depth + (plan.ranks // along_x - 1) * width
-
-    divisors = [divisor for divisor in range(plan.ranks, 0, -1) if plan.ranks % divisor == 0]
-    along_x = min(divisors, key=length_of_cuts)
-    return along_x, plan.ranks // along_x
 
 
 def _layout(plan: Plan) -> DeckLayout:
@@ -568,6 +544,8 @@ def _neighbour_search(plan: Plan) -> NeighbourSearch:
     smallest = min(radii)
     largest = max(radii)
     skin = plan.skin or smallest
+    width = plan.scene.upper[0] - plan.scene.lower[0]
+    depth = plan.scene.upper[1] - plan.scene.lower[1]
     # At least as many of the smallest beads as fit into the search distance of the largest one.
     distance = largest + 2.0 * smallest + skin
     fitting = ceil((distance**3 - largest**3) / smallest**3)
@@ -583,7 +561,7 @@ def _neighbour_search(plan: Plan) -> NeighbourSearch:
         bin_size=bin_size,
         # In piles, sorted beads save a tenth of the time from some ten thousand beads on.
         sorted=plan.skin is not None,
-        processor_grid=processor_grid(plan),
+        processor_grid=processor_grid(plan.ranks, width, depth),
     )
 
 

@@ -20,6 +20,7 @@ from numpy.random import default_rng
 
 from walkers.errors import key_error
 from walkers.inputs.resolving.loads import contact_loads
+from walkers.inputs.resolving.ranks import check_ranks
 from walkers.inputs.tables.bodies import Mixture, Walkers
 from walkers.inputs.tables.case import Case
 from walkers.inputs.tables.shapes.shape import Layer
@@ -204,7 +205,8 @@ def check_bodies(case: Case) -> None:
     """
     if case.boundary.shape == "vessel":
         _check_vessel(case)
-    _check_run(case)
+    check_ranks(case)
+    _check_seed(case)
     _check_conserved_liquid(case)
     mixture = case.mixture
     if mixture is not None:
@@ -218,12 +220,8 @@ def check_bodies(case: Case) -> None:
             _check_overlaps(beads)
 
 
-def _check_run(case: Case) -> None:
-    """Refuse several processes without a container, and a seed without anything that is drawn."""
-    if case.run.ranks > 1 and not case.boundary.closed:
-        raise key_error(
-            "run.ranks", "expected 1: walkers on a plane run slower on several processes"
-        )
+def _check_seed(case: Case) -> None:
+    """Refuse a seed without anything that is drawn."""
     drawn = bool(case.walkers) or case.mixture is not None
     if not drawn and "seed" in case.document.get("run", {}):
         raise key_error(
