@@ -46,13 +46,16 @@ GROUPS = (
     Group(
         "friction of walls and beads",
         {
-            "pile-frictions": ("Coulomb 0.28", "Coulomb 0.35", _GROWING),
+            "pile-frictions": ("Coulomb 0.28", _GROWING),
             "pile-starts": (_AS_SHIPPED,),
+            "pile-laws": (
+                "Coulomb 0.35",
+                "0.5 on walls, 0.28",
+                "0.28, growing on walls",
+                "0.28, growing between beads",
+                "0.28, growing at 94 mm/s",
+            ),
         },
-    ),
-    Group(
-        "growing otherwise",
-        {"pile-laws": ("on walls alone", "between beads alone", "half at 94 mm/s")},
     ),
     Group("friction 0.5, other liquids", {"pile-liquids": ("ethylene glycol", "silicone oil AK5")}),
     Group(
