@@ -445,13 +445,16 @@ def test_a_run_prints_its_result(first_run: FirstRun) -> None:
 
 def test_progress_is_plain_lines_without_a_terminal(first_run: FirstRun) -> None:
     _, done = first_run
-    progress = re.compile(r"mine: (starting|\d+ %(, .* left, .*s simulated, .*steps/s)?|measuring)")
+    progress = re.compile(
+        r"mine: (starting, .* left|\d+ %, .* left, .*s simulated|measuring|done in \d+ s)"
+    )
     lines = []
     for line in done.stderr.splitlines():
         if not line.startswith("walkers: warning:"):
             lines.append(line)
             assert progress.fullmatch(line)
-    assert lines
+    assert len(lines) > 1
+    assert lines[-1].startswith("mine: done in ")
 
 
 def test_a_finished_run_is_not_run_again(first_run: FirstRun) -> None:
