@@ -392,9 +392,12 @@ def test_the_time_left_of_a_run_that_goes_on_is_that_of_the_steps_that_are_left(
     assert progress == (0.96, f"96 %, {seconds / 60:.0f} min left, 0.240 s simulated", "96 %")
 
 
-def test_a_run_that_goes_on_is_starting_before_its_first_step() -> None:
-    """The last of its steps are predicted to take less than a second."""
-    assert progress_of_continued(1104, 0.0).text == "starting, 0 s left"
+def test_only_a_run_of_which_nothing_is_done_is_starting() -> None:
+    """The last steps of a run are predicted to take less than a second."""
+    assert progress_of_continued(1104, 0.0).text == "92 %, 0 s left, 0.230 s simulated"
+    case = make_case()
+    begun = progress_in(case, case.run.cycles, Segment(0, case.run.steps, 0), 0, pace_in(case, []))
+    assert begun.stage == "starting"
 
 
 def test_a_run_that_may_end_early_is_in_its_longest_attempt_after_the_shorter_ones() -> None:

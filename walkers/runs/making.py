@@ -305,7 +305,7 @@ def progress_in(case: Case, cycles: int, segment: Segment, step: int, pace: Pace
     left = f"{duration_text(seconds)} left"
     if case.run.until_steady or case.run.until:
         left = f"at most {left}"
-    if step <= segment.begin:
+    if steps == 0:
         return Progress(share, f"starting, {left}", "starting")
     stage = f"{100 * share:.0f} %"
     if segment.drive_from is None:
