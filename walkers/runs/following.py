@@ -84,7 +84,7 @@ def _grow(files: GrowingVtk, place: Path, complete_before: int) -> int:
     so_far = segments_so_far(place)
     if so_far is None or so_far.complete == complete_before:
         return complete_before
-    with complete_part(place, "running", told=False) as directory:
+    with complete_part(place, "running", warn=False) as directory:
         files.grow(directory)
     return so_far.complete
 

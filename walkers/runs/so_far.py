@@ -59,7 +59,7 @@ def segments_so_far(place: Path) -> SegmentsSoFar | None:
 
 
 @contextmanager
-def complete_part(place: Path, status: str, *, told: bool = True) -> Iterator[Path]:
+def complete_part(place: Path, status: str, *, warn: bool = True) -> Iterator[Path]:
     """Yield a measured run directory with the complete segments of an unfinished run.
 
     Parameters
@@ -68,7 +68,7 @@ def complete_part(place: Path, status: str, *, told: bool = True) -> Iterator[Pa
         The final directory of the run, which has several segments.
     status
         Status of the run, for its title.
-    told
+    warn
         Whether to warn that the run is not finished.
 
     Yields
@@ -92,7 +92,7 @@ def complete_part(place: Path, status: str, *, told: bool = True) -> Iterator[Pa
         raise nothing_yet(place, status)
     case = run_directory.case_of(incomplete)
     part = f"{so_far}: the run is {status}"
-    if told:
+    if warn:
         warn_user(f"{case.name}: {part}")
     with scratch_folder(place.parent, SO_FAR_SCRATCH) as folder:
         directory = folder / place.name
