@@ -68,6 +68,20 @@ def test_output_fits_a_terminal_of_80_columns(command: str, folder: Path) -> Non
     assert wide == []
 
 
+@pytest.mark.parametrize("command", ["", "run", "export", "check", "check engine"])
+def test_help_fits_a_terminal_of_60_columns(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    printed = call(*command.split(), "--help", check=True).stdout
+    assert max(len(line) for line in printed.splitlines()) <= 60
+
+
+def test_help_breaks_no_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """textwrap breaks words after hyphens unless it is told not to."""
+    monkeypatch.setenv("COLUMNS", "60")
+    printed = call("new", "--help", check=True).stdout
+    assert "pile-\n" not in printed
+
+
 def test_a_wide_terminal_has_sources_in_the_lines_of_the_values(folder: Path) -> None:
     source = "library: the paper, Methods (Sandoz Fils precision spheres)"
     assert source in on_terminal("show", "fig1b", folder=folder, columns=200)
