@@ -567,6 +567,33 @@ def test_list_selects_by_results(condition: str, number: int, folder: Path) -> N
     assert len(names) == number
 
 
+def test_a_search_counts_the_runs_that_a_list_hides(folder: Path, tmp_path: Path) -> None:
+    """A sweep has made one run, and the other was asked for."""
+    shutil.copytree(folder / "runs", tmp_path / "runs")
+    shutil.copy(folder / "mine.toml", tmp_path)
+    (tmp_path / "two.toml").write_text(TWO_FREQUENCIES)
+    call("sweep", "two.toml", "-q", check=True, folder=tmp_path)
+    listed = call("list", "--where", "velocity<1 m/s", check=True, folder=tmp_path).stdout
+    assert re.match(r"2 runs, .+; 1 of them made by sweeps alone$", listed.splitlines()[-1])
+    hidden = on_terminal("list", folder=tmp_path, columns=40).splitlines()
+    assert max(map(len, hidden[-3:])) <= 40
+
+
+def test_rows_of_a_removal_fit_a_terminal(folder: Path, tmp_path: Path) -> None:
+    """Two sweeps share runs, which a remark says."""
+    shutil.copytree(folder / "runs", tmp_path / "runs")
+    shutil.copy(folder / "mine.toml", tmp_path)
+    for name in ("first", "second", "third", "fourth", "fifth"):
+        (tmp_path / f"a-sweep-with-a-long-name-{name}.toml").write_text(TWO_FREQUENCIES)
+        call("sweep", f"a-sweep-with-a-long-name-{name}.toml", "-q", check=True, folder=tmp_path)
+    (run,) = json.loads(
+        call("list", "--json", "--where", "frequency=90 Hz", folder=tmp_path).stdout
+    )
+    printed = on_terminal("clean", run["name"], "--yes", folder=tmp_path)
+    assert "fifth" in printed
+    assert max(map(len, printed.splitlines())) <= 80
+
+
 def test_draws_are_searched_with_all_alone(folder: Path) -> None:
     assert len(_listed(folder, "--all", "--where", "velocity<1 m/s")) == 3
 
