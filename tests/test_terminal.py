@@ -287,6 +287,25 @@ def test_the_full_list_of_numbers_is_printed_on_demand(folder: Path) -> None:
     assert len(brief.splitlines()) < len(verbose.splitlines())
 
 
+@pytest.mark.parametrize("options", [[], ["-v"]], ids=str)
+def test_a_spread_is_printed_again_with_its_run(options: list[str], folder: Path) -> None:
+    """As when it was made; only the lines of the run depend on the options."""
+    first = call(
+        "run", "mine.toml", "--spread", "--points", "2", *options, check=True, folder=folder
+    )
+    again = call("run", "mine.toml", *options, check=True, folder=folder)
+    assert "\n  spread     2 draws;" in again.stdout
+    assert again.stdout == first.stdout
+
+
+def test_a_stored_spread_is_the_one_that_was_made(folder: Path) -> None:
+    run = walkers.load(folder / "mine.toml", folder / "runs")
+    assert isinstance(run, walkers.Run)
+    stored = run.stored_spread()
+    assert stored is not None
+    assert stored.as_dict() == run.spread(2).as_dict()
+
+
 @pytest.mark.parametrize(
     ("acceleration", "printed"), [("4 g", "a0 = 4 g"), ("20 m/s^2", "a0 = 20 m/s²")]
 )

@@ -84,6 +84,7 @@ from walkers.sweeps.spread import (
     check_number_of_draws,
     draws_of,
     figures_of_spread,
+    read_spread,
     run_spread,
 )
 from walkers.sweeps.table import SweepTable, aligned_table, describe_status, table_of
@@ -651,6 +652,16 @@ class Run:
                 engine=engine,
                 on_progress=advance,
             )
+
+    def stored_spread(self) -> Spread | None:
+        """The spread of the run that `spread` has made before; None if there is none.
+
+        Examples
+        --------
+        >>> walkers.run("fig4a", tmp).stored_spread() is None
+        True
+        """
+        return read_spread(self.finished_directory)
 
     def accuracy(
         self, *, progress: bool | None = None, engine: str | None = None

@@ -267,9 +267,9 @@ def plan_sweep(
     if options.site is not None:
         check_path(record.directory)
     point_states = states(record)
-    recorded_failures = _recorded_failures(record, point_states, options.final)
+    final = recorded_failures(record, point_states, options.final)
     # Points that need no run: those that have failed for good, and the finished ones.
-    settled = {failure.point for failure in recorded_failures}
+    settled = {failure.point for failure in final}
     statuses = []
     for point, state in enumerate(point_states):
         statuses.append(state.status)
@@ -282,7 +282,7 @@ def plan_sweep(
         decks=_missing_decks(cases, settled, options),
         statuses=statuses,
         options=options,
-        final=recorded_failures,
+        final=final,
     )
 
 
@@ -318,7 +318,7 @@ def _resolved_cases(sweep: SweepDefinition, tell: Tell) -> list[Case]:
     return cases
 
 
-def _recorded_failures(
+def recorded_failures(
     record: SweepRecord, point_states: Sequence[PointState], reasons: Collection[str]
 ) -> list[Failure]:
     """The failures of points with some reasons, as their run directories have recorded them."""
@@ -395,7 +395,7 @@ def run_sweep(
         raise SweepStopped(
             f"{record.directory} was replaced by another sweep of the same name; the runs are kept"
         )
-    unreadable = _recorded_failures(record, states(record, results=True), [UNREADABLE])
+    unreadable = recorded_failures(record, states(record, results=True), [UNREADABLE])
     return record, [*failures, *unreadable]
 
 
