@@ -490,8 +490,13 @@ def _text_of(stream: io.TextIOWrapper) -> str:
     return stream.buffer.getvalue().decode()  # type: ignore[attr-defined, no-any-return]
 
 
-def on_terminal(*arguments: str, folder: Path, columns: int = 80, **variables: str) -> str:
-    """What the program prints on a terminal of its own with so many columns."""
+def on_terminal(
+    *arguments: str, folder: Path, columns: int = 80, errors: bool = False, **variables: str
+) -> str:
+    """What the program prints on a terminal of its own with so many columns.
+
+    With ``errors``, that is also what it prints on the standard error.
+    """
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
     environment = {**os.environ, "TERM": "xterm-256color", **variables}
@@ -501,7 +506,7 @@ def on_terminal(*arguments: str, folder: Path, columns: int = 80, **variables: s
         env=environment,
         stdin=subprocess.DEVNULL,
         stdout=theirs,
-        stderr=subprocess.DEVNULL,
+        stderr=theirs if errors else subprocess.DEVNULL,
     )
     os.close(theirs)
     output = b""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from math import inf, pi, radians, sqrt
+from math import exp, inf, pi, radians, sqrt
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -36,7 +36,7 @@ from walkers.postprocess.show.report.player import _points
 from walkers.postprocess.show.scene import Scene, orientations_of, rotations_at
 from walkers.runner.cost import predicted_overhead, predicted_seconds
 from walkers.runner.manifest import iso_time
-from walkers.runs.making import progress_in
+from walkers.runs.making import pace_in, progress_in
 from walkers.runs.preview import preview_text, summarise
 from walkers.templates.deck import Segment, compose, plan_of, render_deck
 from walkers.templates.placement import place
@@ -374,30 +374,53 @@ CONTINUED = Segment(1104, 1200, 0)
 
 def progress_of_continued(step: int, seconds: float) -> Any:
     """Progress of the reference case, of 20 cycles in 1200 steps, after so many seconds."""
-    run = make_case(
+    case = make_case(
         run={"time_step": "250 us", "allow_unstable": True, "cycles": 20, "settling_cycles": 2}
-    ).run
-    assert run.steps == 1200
-    return progress_in(run, 20, CONTINUED, step, seconds)
+    )
+    assert case.run.steps == 1200
+    pace = pace_in(case, [], step - CONTINUED.begin, seconds)
+    return progress_in(case, 20, CONTINUED, step, pace)
 
 
-def test_the_speed_of_a_run_that_goes_on_is_that_of_this_call() -> None:
-    """48 steps took a second, so 48 more take another."""
-    progress = progress_of_continued(1152, 1.0)
-    assert progress == (0.96, "96 %, 1 s left, 0.240 s simulated, 48 steps/s", "96 %")
+def test_the_time_left_of_a_run_that_goes_on_is_that_of_the_steps_that_are_left() -> None:
+    """48 of 1200 steps took 1080 s; with 3 % of 1200 as if they had taken none, they are 84.
+
+    They count less as 4 % of the work is done, exp(-4/20) times: so many seconds are left.
+    """
+    progress = progress_of_continued(1152, 1080.0)
+    seconds = 48 * 1080.0 / (48 + exp(-0.2) * 36)
+    assert progress == (0.96, f"96 %, {seconds / 60:.0f} min left, 0.240 s simulated", "96 %")
 
 
-@pytest.mark.parametrize(("step", "text"), [(1104, "starting"), (1128, "94 %")])
-def test_a_run_that_goes_on_has_no_speed_within_the_first_second(step: int, text: str) -> None:
-    assert progress_of_continued(step, 0.9).text == text
+def test_only_a_run_of_which_nothing_is_done_is_starting() -> None:
+    """The last steps of a run are predicted to take less than a second."""
+    assert progress_of_continued(1104, 0.0).text == "92 %, 0 s left, 0.230 s simulated"
+    case = make_case()
+    begun = progress_in(case, case.run.cycles, Segment(0, case.run.steps, 0), 0, pace_in(case, []))
+    assert begun.stage == "starting"
 
 
 def test_a_run_that_may_end_early_is_in_its_longest_attempt_after_the_shorter_ones() -> None:
     """Half way through 60 cycles, after attempts of 12 and 24 cycles."""
-    run = load_case("fig1b").run
-    progress = progress_in(run, run.cycles, Segment(0, run.steps, 0), run.steps // 2, 1.0)
+    case = load_case("fig1b")
+    run = case.run
+    whole = Segment(0, run.steps, 0)
+    progress = progress_in(case, run.cycles, whole, run.steps // 2, pace_in(case, []))
     assert progress.share == pytest.approx((12 + 24 + 30) / (12 + 24 + 60))
     assert "at most" in progress.text
+
+
+def test_steps_in_which_a_pile_comes_to_rest_are_part_of_its_work() -> None:
+    """At most three segments of 0.05 s; once the drive has begun after two, these are counted."""
+    run = {"duration": "0.1 s", "time_step": "2.5 us"}
+    case = make_other_case(**(PILE | {"run": run}))
+    driven = case.run.steps
+    pace = pace_in(case, [])
+    resting = progress_in(case, case.run.cycles, Segment(20_000, 40_000, None), 30_000, pace)
+    begun = progress_in(case, case.run.cycles, Segment(40_000, 60_000, 40_000), 50_000, pace)
+    assert resting.share == pytest.approx(30_000 / (60_000 + driven))
+    assert resting.text.startswith("coming to rest, ")
+    assert begun.share == pytest.approx(50_000 / (40_000 + driven))
 
 
 @pytest.fixture

@@ -314,7 +314,7 @@ def test_a_resting_walker_is_called_so_everywhere(out: Path) -> None:
     table = walkers.load(out / "rest").table()
     run = table["run"][0]
     assert (table["velocity"].abs() > 0.0).all()
-    assert ": at rest" in call("run", run, check=True).stdout
+    assert ": at rest (below 0.002 mm/s)" in call("run", run, check=True).stdout
     assert call("list", "--all", check=True).stdout.count(" at rest ") == 2
     assert repr(walkers.load(run)) == f"Run({run}: finished, at rest)"
 

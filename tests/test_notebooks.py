@@ -99,7 +99,7 @@ def run_all_cells(page: Page, laboratory: Laboratory, notebook: str) -> set[str]
 
     def ended() -> bool:
         """Whether each cell has a number; running ones have a star."""
-        bars.update(re.findall("━[━─]+", page.locator(".jp-Notebook").inner_text()))
+        bars.update(re.findall("━[━╸]*", page.locator(".jp-Notebook").inner_text()))
         return all(prompt.strip("[]: ").isdigit() for prompt in prompts.all_text_contents())
 
     wait_for(ended)

@@ -68,6 +68,20 @@ def test_output_fits_a_terminal_of_80_columns(command: str, folder: Path) -> Non
     assert wide == []
 
 
+@pytest.mark.parametrize("command", ["", "run", "export", "check", "check engine"])
+def test_help_fits_a_terminal_of_60_columns(command: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    printed = call(*command.split(), "--help", check=True).stdout
+    assert max(len(line) for line in printed.splitlines()) <= 60
+
+
+def test_help_breaks_no_path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """textwrap breaks words after hyphens unless it is told not to."""
+    monkeypatch.setenv("COLUMNS", "60")
+    printed = call("new", "--help", check=True).stdout
+    assert "pile-\n" not in printed
+
+
 def test_a_wide_terminal_has_sources_in_the_lines_of_the_values(folder: Path) -> None:
     source = "library: the paper, Methods (Sandoz Fils precision spheres)"
     assert source in on_terminal("show", "fig1b", folder=folder, columns=200)
@@ -271,6 +285,25 @@ def test_the_full_list_of_numbers_is_printed_on_demand(folder: Path) -> None:
     assert "cost of transport" in verbose
     assert "rotation of bead 1" in brief
     assert len(brief.splitlines()) < len(verbose.splitlines())
+
+
+@pytest.mark.parametrize("options", [[], ["-v"]], ids=str)
+def test_a_spread_is_printed_again_with_its_run(options: list[str], folder: Path) -> None:
+    """As when it was made; only the lines of the run depend on the options."""
+    first = call(
+        "run", "mine.toml", "--spread", "--points", "2", *options, check=True, folder=folder
+    )
+    again = call("run", "mine.toml", *options, check=True, folder=folder)
+    assert "\n  spread     2 draws;" in again.stdout
+    assert again.stdout == first.stdout
+
+
+def test_a_stored_spread_is_the_one_that_was_made(folder: Path) -> None:
+    run = walkers.load(folder / "mine.toml", folder / "runs")
+    assert isinstance(run, walkers.Run)
+    stored = run.stored_spread()
+    assert stored is not None
+    assert stored.as_dict() == run.spread(2).as_dict()
 
 
 @pytest.mark.parametrize(
@@ -551,6 +584,33 @@ def test_spreads_of_points_are_listed_with_all_alone(in_folder: Path) -> None:
 def test_list_selects_by_results(condition: str, number: int, folder: Path) -> None:
     names = _listed(folder, "--where", condition)
     assert len(names) == number
+
+
+def test_a_search_counts_the_runs_that_a_list_hides(folder: Path, tmp_path: Path) -> None:
+    """A sweep has made one run, and the other was asked for."""
+    shutil.copytree(folder / "runs", tmp_path / "runs")
+    shutil.copy(folder / "mine.toml", tmp_path)
+    (tmp_path / "two.toml").write_text(TWO_FREQUENCIES)
+    call("sweep", "two.toml", "-q", check=True, folder=tmp_path)
+    listed = call("list", "--where", "velocity<1 m/s", check=True, folder=tmp_path).stdout
+    assert re.match(r"2 runs, .+; 1 of them made by sweeps alone$", listed.splitlines()[-1])
+    hidden = on_terminal("list", folder=tmp_path, columns=40).splitlines()
+    assert max(map(len, hidden[-3:])) <= 40
+
+
+def test_rows_of_a_removal_fit_a_terminal(folder: Path, tmp_path: Path) -> None:
+    """Two sweeps share runs, which a remark says."""
+    shutil.copytree(folder / "runs", tmp_path / "runs")
+    shutil.copy(folder / "mine.toml", tmp_path)
+    for name in ("first", "second", "third", "fourth", "fifth"):
+        (tmp_path / f"a-sweep-with-a-long-name-{name}.toml").write_text(TWO_FREQUENCIES)
+        call("sweep", f"a-sweep-with-a-long-name-{name}.toml", "-q", check=True, folder=tmp_path)
+    (run,) = json.loads(
+        call("list", "--json", "--where", "frequency=90 Hz", folder=tmp_path).stdout
+    )
+    printed = on_terminal("clean", run["name"], "--yes", folder=tmp_path)
+    assert "fifth" in printed
+    assert max(map(len, printed.splitlines())) <= 80
 
 
 def test_draws_are_searched_with_all_alone(folder: Path) -> None:

@@ -84,6 +84,7 @@ from walkers.sweeps.spread import (
     check_number_of_draws,
     draws_of,
     figures_of_spread,
+    read_spread,
     run_spread,
 )
 from walkers.sweeps.table import SweepTable, aligned_table, describe_status, table_of
@@ -106,7 +107,7 @@ Export = Literal["deck", "vtk", "lammps", "csv", "archive"]
 
 _OPTIONS_OF_FORMS: Mapping[str, tuple[str, ...]] = {
     "deck": (),
-    "vtk": ("every",),
+    "vtk": ("every", "follow"),
     "lammps": ("every",),
     "csv": ("units",),
     "archive": ("dumps", "authors", "licence"),
@@ -652,6 +653,16 @@ class Run:
                 on_progress=advance,
             )
 
+    def stored_spread(self) -> Spread | None:
+        """The spread of the run that `spread` has made before; None if there is none.
+
+        Examples
+        --------
+        >>> walkers.run("fig4a", tmp).stored_spread() is None
+        True
+        """
+        return read_spread(self.finished_directory)
+
     def accuracy(
         self, *, progress: bool | None = None, engine: str | None = None
     ) -> dict[str, Any]:
@@ -700,6 +711,8 @@ class Run:
         dumps: bool = True,
         authors: Sequence[str] = (),
         licence: str | None = None,
+        follow: bool = False,
+        progress: bool | None = None,
     ) -> Path:
         """Write the run for other programs.
 
@@ -723,6 +736,11 @@ class Run:
             ``archive``: names of the authors of the run.
         licence
             ``archive``: licence of the data, such as ``CC-BY-4.0``.
+        follow
+            ``vtk``: of a run that goes on, write the complete segments, and each further one, until
+            the run ends; by default into the folder ``NAME-vtk``.
+        progress
+            With ``follow``: show the progress; None: only in notebooks.
 
         Returns
         -------
@@ -740,22 +758,21 @@ class Run:
         >>> walkers.run("fig1b", tmp).export("lammps", tmp / "walk.lammpstrj", every=20).name
         'walk.lammpstrj'
         """
-        chosen = []
-        if every is not None:
-            chosen.append("every")
-        if units is not None:
-            chosen.append("units")
-        if not dumps:
-            chosen.append("dumps")
-        if authors:
-            chosen.append("authors")
-        if licence is not None:
-            chosen.append("licence")
-        check_export(form, chosen)
+        options = {
+            "every": every is not None,
+            "units": units is not None,
+            "dumps": not dumps,
+            "authors": bool(authors),
+            "licence": licence is not None,
+            "follow": follow,
+        }
+        check_export(form, [name for name, is_given in options.items() if is_given])
         place = _path(to)
         if form == "deck":
             case = as_run(self.case, self.directory)
             return write_folder(case, place or Path(f"{self.directory.name}-deck"))
+        if follow and self.status != "finished":
+            return self._follow(place or Path(f"{self.directory.name}-vtk"), every, progress)
         directory = self.finished_directory
         if form == "vtk":
             from walkers.postprocess.show.paraview import write_vtk
@@ -772,6 +789,13 @@ class Run:
         from walkers.archive.writing import write_archive
 
         return write_archive(directory, place, dumps=dumps, authors=authors, licence=licence)
+
+    def _follow(self, place: Path, every: int | None, progress: bool | None) -> Path:
+        """Write the segments of an unfinished run for ParaView as they are completed."""
+        from walkers.runs.following import follow_vtk
+
+        with progress_of(str(place), progress) as advance:
+            return follow_vtk(self.directory, place, every=every, on_progress=advance)
 
 
 def check_export(form: str, options: Sequence[str] = ()) -> None:

@@ -12,7 +12,6 @@ import os
 import signal
 import subprocess
 import sys
-import textwrap
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -24,7 +23,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from walkers.commands import ALL_COMMANDS
 from walkers.errors import InputError, WalkersError, shortened
-from walkers.terminal import ERROR, HEADING, WARNING, message_text, styled
+from walkers.terminal import ERROR, HEADING, WARNING, message_text, styled, text_width, wrapped
 from walkers.text import printable
 
 if TYPE_CHECKING:
@@ -51,8 +50,8 @@ _LARGEST_NAME_WIDTH = 24
 _OLD_NAMES = ("--out", "-o")
 """Earlier names of options, which help leaves out."""
 
-_HELP_WIDTH = 80
-"""Width of the help, characters."""
+_LARGEST_HELP_WIDTH = 80
+"""Largest width of the help, characters; narrower terminals have it fitted to them."""
 
 _LONGEST_MESSAGE = 1000
 """Largest length of a message about the command line, characters."""
@@ -157,6 +156,11 @@ def print_help() -> None:
     _print_panel("Options", _OPTIONS)
 
 
+def _help_width() -> int:
+    """Width of the help, characters."""
+    return min(_LARGEST_HELP_WIDTH, text_width())
+
+
 def _print_panel(title: str, meanings: Mapping[str, str]) -> None:
     """Print names and their meanings in two columns below a heading."""
     if not meanings:
@@ -165,7 +169,7 @@ def _print_panel(title: str, meanings: Mapping[str, str]) -> None:
     margin = " " * (width + 4)
     print(f"\n{styled(f'{title}:', HEADING)}")
     for name, meaning in meanings.items():
-        first, *rest = textwrap.wrap(meaning, _HELP_WIDTH - len(margin)) or [""]
+        first, *rest = wrapped(meaning, width=_help_width() - len(margin)) or [""]
         if len(name) <= width:
             print(f"  {name:{width}}  {first}")
         else:
@@ -210,7 +214,8 @@ class _PlainHelp:
 
     def render_description(self, _console: object, _options: object, description: Any) -> None:
         """Print what the command does."""
-        self.before_panels.append(f"\n{textwrap.fill(_plain(description), _HELP_WIDTH)}")
+        lines = wrapped(_plain(description), width=_help_width())
+        self.before_panels.append("\n".join(["", *lines]))
 
 
 def _complete_usage(usage: str, entries: Iterable[HelpEntry]) -> str:

@@ -45,6 +45,9 @@ class ExportOptions:
         archive: name of an author. Repeatable.
     licence
         archive: licence of the data, such as CC-BY-4.0; default: not stated.
+    follow
+        vtk: write the complete segments of a run that goes on, and each further one, until the run
+        ends; default folder: NAME-vtk.
     """
 
     every: int | None = None
@@ -52,6 +55,7 @@ class ExportOptions:
     dumps: Annotated[bool, Parameter("--without-dumps")] = False
     authors: Annotated[list[str] | None, Parameter("--author")] = None
     licence: str | None = None
+    follow: Annotated[bool, Parameter(("--follow", "-f"))] = False
 
 
 def export(
@@ -85,6 +89,8 @@ def export(
     loaded = lookup.load(name)
     if isinstance(loaded, Sweep) and form != "archive":
         loaded.export(form)  # refuses it; sweeps do not know the options of other forms
+    if options.follow:
+        given["progress"] = True
     print(loaded.export(form, to, **given))
 
 
@@ -101,6 +107,8 @@ def _given_options(options: ExportOptions) -> dict[str, Any]:
         given["authors"] = options.authors
     if options.licence is not None:
         given["licence"] = options.licence
+    if options.follow:
+        given["follow"] = True
     return given
 
 

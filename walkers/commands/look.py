@@ -70,16 +70,19 @@ def list_(
         return
     refuse("--to", to is not None, "expected a sweep, whose table is written")
     entries = listing.inventory(out)
-    shown = entries if every else listing.without_members(entries)
+    usual = listing.without_members(entries)
+    shown = entries if every else usual
     hidden = len(entries) - len(shown)
+    usually_hidden = 0
     if where:
         searched = entries if every else listing.without_draws(entries)
         shown = select([entry for entry in searched if entry.kind == "run"], where)
         hidden = 0
+        usually_hidden = len([entry for entry in shown if entry not in usual])
     print_as(
         as_json,
         lambda: listing.as_json(shown),
-        lambda: listing.listing_text(shown, hidden, table_width()),
+        lambda: listing.listing_text(shown, hidden, table_width(), usually_hidden=usually_hidden),
     )
 
 

@@ -228,7 +228,7 @@ def _run_one(
     band: Spread | None = None
     if options.draws:
         band = done.spread(options.draws, progress=is_told, engine=engine)
-    _print_run(done, band, options)
+    _print_run(done, band or done.stored_spread(), options)
     return band is not None and bool(band.failures)
 
 

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import json
+import re
 from pathlib import Path
 
 from walkers.errors import check_text_or_path, check_utf8, expected_of, input_error
 from walkers.files import write_json
 from walkers.inputs.reading import shipped
 
+_TITLE = re.compile("^title += .*", re.MULTILINE)
+"""The line of a shipped case with its title."""
 _SCHEMA = "case.schema.json"
 """Name of the JSON schema beside a new case file."""
 
 
 def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[Path]:
     """Write a new case file, a copy of a shipped case, whose comments explain its keys.
+
+    Its title names the file, because pictures and reports of the new case show it.
 
     Parameters
     ----------
@@ -45,7 +51,8 @@ def new(path: str | Path, case: str = "fig1b", *, schema: bool = False) -> list[
     cases = shipped("case")
     if case not in cases:
         raise input_error(case, expected_of(str(case), cases))
-    text = cases[case].read_text("utf-8")
+    title = json.dumps(f"{path.stem}, from {case}", ensure_ascii=False)
+    text = _TITLE.sub(lambda _: f"title = {title}", cases[case].read_text("utf-8"), count=1)
     if schema:
         text = f"#:schema {_SCHEMA}\n\n{text}"
     try:

@@ -11,6 +11,7 @@ import shlex
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import lru_cache
+from platform import node
 from typing import Any
 
 from walkers.cache import cache_folder, is_trusted, make_cache_folder
@@ -43,11 +44,13 @@ def check_audit(engine: Engine) -> None:
     Warns
     -----
     UnauditedEngineWarning
-        If the engine was never audited with its contact model; once in a process.
+        If the engine was never audited with its contact model; once on a machine. The manifests of
+        its runs say so, too.
     """
-    audit = read_audit(engine.sha256, model_sha256(engine))
+    model = model_sha256(engine)
+    audit = read_audit(engine.sha256, model)
     if audit is None:
-        _warn_unaudited(engine)
+        _warn_unaudited(engine, model)
     elif not audit["passed"]:
         failures = audit["failures"]
         raise AuditFailed(
@@ -64,12 +67,23 @@ def _audit_command(engine: Engine) -> str:
 
 
 @lru_cache(maxsize=8)
-def _warn_unaudited(engine: Engine) -> None:
-    """Warn of an engine without an audit; because of the cache, only once in a process."""
+def _warn_unaudited(engine: Engine, model: str | None) -> None:
+    """Warn of an engine without an audit, unless this machine has been warned of it before.
+
+    What the cache notes is the name of the machine, because home folders may be shared. Where the
+    cache cannot be written, each process warns.
+    """
+    note = cache_folder() / "unaudited" / f"{node()}-{engine.sha256[:12]}-{(model or '')[:12]}"
+    if note.exists():
+        return
+    with suppress(OSError):
+        make_cache_folder(note.parent.name)
+        note.touch()
     warn_user(
         f"{engine.path} was never audited with its contact model: {_audit_command(engine)} "
         "compares the forces of this binary with the expected ones, once for a machine. Until "
-        "then, runs are computed all the same, but nothing shows that their forces are right",
+        "then, runs are computed all the same, but nothing shows that their forces are right "
+        "(this is said once)",
         UnauditedEngineWarning,
     )
 

@@ -86,19 +86,31 @@ def predicted_seconds(case: Case, walkers: int | None = None) -> float:
     if run.rests:
         segments += RESTING_SEGMENTS
         steps += RESTING_SEGMENTS * settling_steps(case)
-    speed_up = 1.0 + _GAIN_PER_RANK * (run.ranks - 1)
-    if case.loose:  # beads outside of walkers, such as a pile
-        seconds_a_step = _PILE_MICROSECONDS * 1e-6
-        seconds_a_step += case.count / (_BEAD_STEPS_PER_SECOND * speed_up)
-    else:
-        pairs = pairs_of_beads(case) if walkers is None else walkers
-        seconds_a_step = (_STEP_MICROSECONDS + _WALKER_MICROSECONDS * pairs) * 1e-6
     start_up = START_UP_SECONDS
     if case.boundary.triangles:
-        beads = case.count if walkers is None else 2 * walkers
-        seconds_a_step += beads * _seconds_at_facets(case) / speed_up
         start_up += _FACET_START_UP_SECONDS * len(case.boundary.walls)
-    return start_up * segments + steps * seconds_a_step
+    return start_up * segments + steps * predicted_seconds_of_step(case, walkers)
+
+
+def predicted_seconds_of_step(case: Case, walkers: int | None = None) -> float:
+    """Time that the engine takes for a step of a deck; see `predicted_seconds`.
+
+    Returns
+    -------
+    float
+        Wall time, s.
+    """
+    speed_up = 1.0 + _GAIN_PER_RANK * (case.run.ranks - 1)
+    if case.loose:  # beads outside of walkers, such as a pile
+        seconds = _PILE_MICROSECONDS * 1e-6
+        seconds += case.count / (_BEAD_STEPS_PER_SECOND * speed_up)
+    else:
+        pairs = pairs_of_beads(case) if walkers is None else walkers
+        seconds = (_STEP_MICROSECONDS + _WALKER_MICROSECONDS * pairs) * 1e-6
+    if case.boundary.triangles:
+        beads = case.count if walkers is None else 2 * walkers
+        seconds += beads * _seconds_at_facets(case) / speed_up
+    return seconds
 
 
 def _expected_cycles(attempts: Sequence[int]) -> float:

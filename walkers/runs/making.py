@@ -27,12 +27,13 @@ from typing import Any
 from walkers.errors import Stopped, WalkersError
 from walkers.files import fsync_path, link_or_copy, make_folder, read_json, write_json
 from walkers.inputs.tables.case import Case
-from walkers.inputs.tables.run import RunSettings
+from walkers.pace import Pace
 from walkers.postprocess.measure.results import measure
 from walkers.progress import Progress, Tell
 from walkers.rounding import duration_text
 from walkers.runner import run_directory
 from walkers.runner.binary import Engine
+from walkers.runner.cost import predicted_seconds_of_step
 from walkers.runner.failures import BeadsOverTheTop
 from walkers.runner.launch import EngineReport, check_free_space, last_step, launch
 from walkers.runner.manifest import FinishedRun, write_manifest
@@ -45,8 +46,6 @@ _LEAST_BYTES = 150
 """Smallest size of a complete restart file per atom; measured: 300 to 580."""
 _RMS_VELOCITY = re.compile(rb"^root mean square velocity (\S+)", re.MULTILINE)
 """Mass-weighted velocity of the beads, m/s, which decks print while the beads settle."""
-_STARTING_SECONDS = 1.0
-"""Time after which the speed of the engine is told, s; before, its start dominates the speed."""
 
 
 class DamagedSegment(WalkersError):
@@ -180,9 +179,8 @@ def progress_at(place: Path, case: Case | None = None) -> Progress | None:
 
 def _progress_of_shared_deck(folder: Path) -> Progress:
     """Progress of the shared deck in a folder, from the last step in its log."""
-    share = last_step(folder / decks.OUTPUT_NAME) / run_directory.read_layout(folder).steps
-    percent = f"{100 * share:.0f} %"
-    return Progress(share, percent, percent)
+    step = last_step(folder / decks.OUTPUT_NAME)
+    return _progress_of_deck(step, run_directory.read_layout(folder).steps)
 
 
 def _progress_of_segment(directory: Path, case: Case) -> Progress:
@@ -190,15 +188,14 @@ def _progress_of_segment(directory: Path, case: Case) -> Progress:
     done = _complete_segments(directory)
     # `ValueError` unless there is exactly one: segments are made one after the other.
     (folder,) = (directory / run_directory.SEGMENTS).glob("*.new")
-    run = case.run
-    cycles = run.cycles
-    if run.until_steady:
-        cycles = run_directory.read_layout(folder).steps // run.steps_per_cycle
+    cycles = case.run.cycles
+    if case.run.until_steady:
+        cycles = run_directory.read_layout(folder).steps // case.run.steps_per_cycle
     begin = int(done[-1]["end"]) if done else 0
     segment = Segment(begin, begin, run_directory.drive_from(case, done))
     step = max(begin, last_step(folder / decks.OUTPUT_NAME))
     seconds = time.time() - (folder / decks.DECK_NAME).stat().st_mtime
-    return progress_in(run, cycles, segment, step, seconds)
+    return progress_in(case, cycles, segment, step, pace_in(case, done, step - begin, seconds))
 
 
 def share_kept(place: Path) -> float | None:
@@ -228,65 +225,98 @@ def share_kept(place: Path) -> float | None:
         return None
     end = int(done[-1]["end"])
     segment = Segment(end, end, run_directory.drive_from(case, done))
-    return progress_in(case.run, cycles, segment, end, 0.0).share
+    return _steps_done(case, cycles, segment, end) / _steps_in_total(case, segment)
 
 
-def progress_in(
-    run: RunSettings, cycles: int, segment: Segment, step: int, seconds: float
-) -> Progress:
-    """Progress of a run within a segment.
+def _steps_done(case: Case, cycles: int, segment: Segment, step: int) -> int:
+    """Steps of all attempts, and while the beads came to rest, when a segment is at a step.
 
     A run until constant velocities is tried with growing numbers of cycles; a segment belongs to
-    one of these attempts. Shares and times count the steps of all attempts since the drive began.
+    one of these attempts, of so many cycles.
+    """
+    reached = max(step, segment.begin)
+    if segment.drive_from is None:
+        return min(reached, _most_resting_steps(case))
+    return case.run.steps_of_attempts(cycles - 1) + reached
+
+
+def _most_resting_steps(case: Case) -> int:
+    """Number of steps that beads need to come to rest, at most by experience."""
+    return decks.RESTING_SEGMENTS * decks.settling_steps(case)
+
+
+def _steps_in_total(case: Case, segment: Segment) -> int:
+    """Largest number of steps of a run, with those in which its beads come to rest.
+
+    How many these are is known when the drive has begun.
+    """
+    steps = case.run.steps_of_attempts(case.run.cycles)
+    if segment.drive_from is None:
+        return _most_resting_steps(case) + steps
+    return segment.drive_from + steps
+
+
+def pace_in(
+    case: Case, done: Sequence[Mapping[str, Any]], steps: int = 0, seconds: float = 0.0
+) -> Pace:
+    """The pace of a run, from the records of its complete segments and the one that is running.
 
     Parameters
     ----------
-    run
-        Settings of the run.
+    case
+        The case of the run.
+    done
+        Records of its complete segments.
+    steps
+        Steps of the running segment that are done.
+    seconds
+        Wall time since its start, s.
+    """
+    seconds_of_step = predicted_seconds_of_step(case)
+    pace = Pace.of_prediction(case.run.steps * seconds_of_step)
+    for record in done:
+        predicted = (record["end"] - record["begin"]) * seconds_of_step
+        pace = pace.after(record["wall_seconds"], predicted)
+    return pace.after(seconds, steps * seconds_of_step)
+
+
+def progress_in(case: Case, cycles: int, segment: Segment, step: int, pace: Pace) -> Progress:
+    """Progress of a run within a segment.
+
+    Shares and times count the steps of all attempts.
+
+    Parameters
+    ----------
+    case
+        The case of the run.
     cycles
         Number of cycles of the current attempt.
     segment
         The segment; its ``drive_from`` is None while the beads come to rest.
     step
         The step that the engine has reached.
-    seconds
-        Wall time since the start of the segment, s. In the first second the speed is not told.
+    pace
+        The pace of the run (`pace_in`).
     """
-    step = max(step, segment.begin)
-    steps_of_earlier_attempts = run.steps_of_attempts(cycles - 1)
-    steps = run.steps_of_attempts(run.cycles)
-    done = steps_of_earlier_attempts
-    if segment.drive_from is not None:
-        done += step - segment.drive_from
-    share = done / steps
-    text = "coming to rest" if segment.drive_from is None else f"{100 * share:.0f} %"
-    rate = 0.0
-    if seconds >= _STARTING_SECONDS:
-        rate = (step - segment.begin) / seconds
-    if rate == 0.0:
-        stage = text if step > segment.begin else "starting"
-        return Progress(share, stage, stage)
-    left = f"{duration_text((steps - done) / rate)} left"
-    if run.until_steady or run.until:
+    steps = _steps_done(case, cycles, segment, step)
+    most = _steps_in_total(case, segment)
+    share = steps / most
+    seconds = (most - steps) * predicted_seconds_of_step(case) * pace.slowness
+    left = f"{duration_text(seconds)} left"
+    if case.run.until_steady or case.run.until:
         left = f"at most {left}"
-    simulated = (steps_of_earlier_attempts + step) * run.time_step
-    details = f"{text}, {left}, {simulated:.3f} s simulated, {rate:.0f} steps/s"
-    return Progress(share, details, text)
+    if steps == 0:
+        return Progress(share, f"starting, {left}", "starting")
+    stage = f"{100 * share:.0f} %"
+    if segment.drive_from is None:
+        stage = "coming to rest"
+    return Progress(share, f"{stage}, {left}, {steps * case.run.time_step:.3f} s simulated", stage)
 
 
-def _step_callback(
-    run: RunSettings, cycles: int, segment: Segment, tell: Tell | None
-) -> Callable[[int], None] | None:
-    """A callback for the steps that `launch` sees, which tells the progress of the run."""
-    if tell is None:
-        return None
-    start = time.perf_counter()
-
-    def tell_step(step: int) -> None:
-        seconds = time.perf_counter() - start
-        tell(progress_in(run, cycles, segment, step, seconds))
-
-    return tell_step
+def _progress_of_deck(step: int, steps: int) -> Progress:
+    """Progress of a shared deck that is at a step of so many."""
+    percent = f"{100 * step / steps:.0f} %"
+    return Progress(step / steps, percent, percent)
 
 
 # --- one run --------------------------------------------------------------------------------------
@@ -348,9 +378,9 @@ class OpenRun:
             self._remove_shorter_attempt(case)
             segment = self._next_segment(case)
             while segment.end > segment.begin:
-                tell = _step_callback(self.case.run, cycles, segment, on_progress)
+                on_step = self._step_callback(cycles, segment, on_progress)
                 try:
-                    self._make_segment(segment, render(case, segment), tell, time_limit)
+                    self._make_segment(segment, render(case, segment), on_step, time_limit)
                 except BeadsOverTheTop as over:
                     if not self._ends_with_lost_beads(segment):
                         raise
@@ -362,6 +392,21 @@ class OpenRun:
                 segment = self._next_segment(case)
             if cycles < self.case.run.cycles and _are_constant(self.directory):
                 return
+
+    def _step_callback(
+        self, cycles: int, segment: Segment, tell: Tell | None
+    ) -> Callable[[int], None] | None:
+        """A callback for the steps that `launch` sees, which tells the progress of the run."""
+        if tell is None:
+            return None
+        start = time.perf_counter()
+
+        def tell_step(step: int) -> None:
+            seconds = time.perf_counter() - start
+            pace = pace_in(self.case, self.done, max(0, step - segment.begin), seconds)
+            tell(progress_in(self.case, cycles, segment, step, pace))
+
+        return tell_step
 
     def _remove_shorter_attempt(self, case: Case) -> None:
         """Remove the segment of an earlier attempt, which has fewer cycles than the case."""
@@ -405,7 +450,7 @@ class OpenRun:
         self,
         segment: Segment,
         deck: Deck,
-        tell: Callable[[int], None] | None,
+        on_step: Callable[[int], None] | None,
         time_limit: float | None,
     ) -> None:
         """Run the deck of the next segment, and add the segment's record to `done`."""
@@ -426,7 +471,7 @@ class OpenRun:
             if segment.begin:
                 shutil.copyfile(before / decks.RESTART_NAME, new / decks.PREVIOUS_RESTART_NAME)
             report = launch(
-                deck, new, self.engine, on_step=tell, time_limit=time_limit, keep_open=self.locks
+                deck, new, self.engine, on_step=on_step, time_limit=time_limit, keep_open=self.locks
             )
             (new / decks.PREVIOUS_RESTART_NAME).unlink(missing_ok=True)
             if not self.case.run.has_one_segment:
@@ -630,13 +675,11 @@ def _make_together(
             for name, case in cases.items():
                 (incomplete / name).mkdir()
                 run_directory.write_case(incomplete / name, case)
-            segment = decks.next_segment(attempted[first])
-            tell = _step_callback(cases[first].run, cycles, segment, options.on_progress)
             report = launch(
                 deck,
                 folder,
                 options.engine,
-                on_step=tell,
+                on_step=_deck_callback(deck.layout.steps, options.on_progress),
                 time_limit=options.time_limit,
                 keep_open=options.locks,
             )
@@ -667,6 +710,13 @@ def _make_together(
     for name in done:  # remains of a run that was made alone and killed
         shutil.rmtree(run_directory.unfinished(out / name), ignore_errors=True)
     return done
+
+
+def _deck_callback(steps: int, tell: Tell | None) -> Callable[[int], None] | None:
+    """A callback for the steps that `launch` sees, which tells the progress of a shared deck."""
+    if tell is None:
+        return None
+    return lambda step: tell(_progress_of_deck(step, steps))
 
 
 def _distribute_output(

@@ -21,7 +21,8 @@ from walkers.runner import run_directory
 from walkers.runner.manifest import MANIFEST_NAME
 from walkers.runner.run_directory import CASE_NAME
 from walkers.runs.listing import ListEntry, bytes_text, place_of, runs_in, size_and_last_change
-from walkers.text import aligned
+from walkers.terminal import table_width
+from walkers.text import aligned_with_text
 
 _MOST_LINES = 40
 """Largest number of removals that are listed one by one."""
@@ -144,7 +145,7 @@ def removal_text(removals: Sequence[Removal]) -> str:
             total += size
     texts = []
     if lines:
-        texts.append(aligned(lines[:_MOST_LINES]))
+        texts.append(aligned_with_text(lines[:_MOST_LINES], table_width()))
     if len(lines) > _MOST_LINES:
         texts.append(f"and {len(lines) - _MOST_LINES} more")
     kinds = [counted(number, label) for label, number in numbers.items()]

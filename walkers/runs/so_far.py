@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 
-from walkers.errors import input_error
+from walkers.errors import InputError, input_error
 from walkers.files import SO_FAR_SCRATCH, link_or_copy, read_json, scratch_folder
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.results import measure
@@ -20,8 +21,45 @@ from walkers.templates.deck import RESTART_NAME
 from walkers.warning import warn_user
 
 
+@dataclass(frozen=True)
+class SegmentsSoFar:
+    """The complete segments of an unfinished run.
+
+    Attributes
+    ----------
+    complete
+        Number of complete segments.
+    total
+        Number of all segments that are expected now.
+    """
+
+    complete: int
+    total: int
+
+    def __str__(self) -> str:
+        """The segments as text."""
+        return f"segments 1 to {self.complete} of {self.total}"
+
+
+def segments_so_far(place: Path) -> SegmentsSoFar | None:
+    """The complete segments of an unfinished run; None if none of its drive is complete yet.
+
+    Parameters
+    ----------
+    place
+        The final directory of the run.
+    """
+    incomplete = run_directory.unfinished(place)
+    segments = run_directory.segment_directories(incomplete)
+    settling = _settling_segments(segments)
+    if settling is None:
+        return None
+    run = run_directory.case_of(incomplete).run
+    return SegmentsSoFar(len(segments), settling + ceil(run.cycles / run.cycles_per_segment))
+
+
 @contextmanager
-def complete_part(place: Path, status: str) -> Iterator[Path]:
+def complete_part(place: Path, status: str, *, warn: bool = True) -> Iterator[Path]:
     """Yield a measured run directory with the complete segments of an unfinished run.
 
     Parameters
@@ -30,6 +68,8 @@ def complete_part(place: Path, status: str) -> Iterator[Path]:
         The final directory of the run, which has several segments.
     status
         Status of the run, for its title.
+    warn
+        Whether to warn that the run is not finished.
 
     Yields
     ------
@@ -47,22 +87,27 @@ def complete_part(place: Path, status: str) -> Iterator[Path]:
         With the numbers of the segments.
     """
     incomplete = run_directory.unfinished(place)
+    so_far = segments_so_far(place)
+    if so_far is None:
+        raise nothing_yet(place, status)
     case = run_directory.case_of(incomplete)
-    segments = run_directory.segment_directories(incomplete)
-    settling = _settling_segments(segments)
-    if settling is None:
-        message = f"the run is {status}, and no segment of its drive is complete yet"
-        raise input_error(place, message)
-    total = settling + ceil(case.run.cycles / case.run.cycles_per_segment)
-    part = f"segments 1 to {len(segments)} of {total}: the run is {status}"
-    warn_user(f"{case.name}: {part}")
+    part = f"{so_far}: the run is {status}"
+    if warn:
+        warn_user(f"{case.name}: {part}")
     with scratch_folder(place.parent, SO_FAR_SCRATCH) as folder:
         directory = folder / place.name
         directory.mkdir()
         title = f"{case.title or case.name} ({part})"
+        segments = run_directory.segment_directories(incomplete)[: so_far.complete]
         _fill(directory, case.with_values(title=title), segments)
         measure(directory)
         yield directory
+
+
+def nothing_yet(place: Path, status: str) -> InputError:
+    """The error about an unfinished run with no complete segment of its drive."""
+    message = f"the run is {status}, and no segment of its drive is complete yet"
+    return input_error(place, message)
 
 
 def _settling_segments(segments: list[Path]) -> int | None:

@@ -20,6 +20,7 @@ from walkers.runs.case_text import FlatCase
 from walkers.runs.listing import ListEntry, by_case, bytes_text, folders_in, runs_in
 from walkers.runs.status import status_text, worst_status
 from walkers.sweeps.record import RECORD_NAME, read_sweep_record, states
+from walkers.terminal import wrapped
 from walkers.text import fitted_table
 
 
@@ -150,7 +151,13 @@ def as_json(contents: Sequence[ListEntry]) -> list[dict[str, Any]]:
     return rows
 
 
-def listing_text(contents: Sequence[ListEntry], hidden: int = 0, width: int | None = None) -> str:
+def listing_text(
+    contents: Sequence[ListEntry],
+    hidden: int = 0,
+    width: int | None = None,
+    *,
+    usually_hidden: int = 0,
+) -> str:
     """Entries as text: sweeps, then the runs of each case; velocities in mm/s.
 
     Spreads and accuracies are named by the condition of their run.
@@ -163,6 +170,8 @@ def listing_text(contents: Sequence[ListEntry], hidden: int = 0, width: int | No
         Number of runs of sweeps that are not among them, for the last line.
     width
         Width to which the tables are fitted, characters; None: a line for each entry.
+    usually_hidden
+        Number of the entries that a list without a condition hides, for the last line.
     """
     sweeps = [entry for entry in _of_kind("sweep", contents) if not run_of_sweep(entry.name)]
     companions = [entry for entry in _of_kind("sweep", contents) if run_of_sweep(entry.name)]
@@ -180,7 +189,10 @@ def listing_text(contents: Sequence[ListEntry], hidden: int = 0, width: int | No
     total = f"{', '.join(totals)}, {bytes_text(sum(entry.size for entry in contents))}"
     if hidden:
         total += f"; not shown: {hidden} runs of sweeps (--all)"
-    return "\n\n".join([*blocks, total])
+    if usually_hidden:
+        total += f"; {usually_hidden} of them made by sweeps alone"
+    last_lines = [total] if width is None else wrapped(total, width=width)
+    return "\n\n".join([*blocks, "\n".join(last_lines)])
 
 
 def _sweeps_text(sweeps: Sequence[ListEntry], width: int | None) -> str:

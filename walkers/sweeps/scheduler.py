@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 from walkers.errors import InputError, Problem, WalkersError, check_utf8, input_error
 from walkers.inputs.sweep import SweepDefinition
 from walkers.inputs.tables.case import Case
+from walkers.pace import Pace
 from walkers.postprocess.measure.results import ensure_measured
 from walkers.progress import Progress, Tell
 from walkers.rounding import counted, duration_text
@@ -266,9 +267,9 @@ def plan_sweep(
     if options.site is not None:
         check_path(record.directory)
     point_states = states(record)
-    recorded_failures = _recorded_failures(record, point_states, options.final)
+    final = recorded_failures(record, point_states, options.final)
     # Points that need no run: those that have failed for good, and the finished ones.
-    settled = {failure.point for failure in recorded_failures}
+    settled = {failure.point for failure in final}
     statuses = []
     for point, state in enumerate(point_states):
         statuses.append(state.status)
@@ -281,7 +282,7 @@ def plan_sweep(
         decks=_missing_decks(cases, settled, options),
         statuses=statuses,
         options=options,
-        final=recorded_failures,
+        final=final,
     )
 
 
@@ -317,7 +318,7 @@ def _resolved_cases(sweep: SweepDefinition, tell: Tell) -> list[Case]:
     return cases
 
 
-def _recorded_failures(
+def recorded_failures(
     record: SweepRecord, point_states: Sequence[PointState], reasons: Collection[str]
 ) -> list[Failure]:
     """The failures of points with some reasons, as their run directories have recorded them."""
@@ -394,7 +395,7 @@ def run_sweep(
         raise SweepStopped(
             f"{record.directory} was replaced by another sweep of the same name; the runs are kept"
         )
-    unreadable = _recorded_failures(record, states(record, results=True), [UNREADABLE])
+    unreadable = recorded_failures(record, states(record, results=True), [UNREADABLE])
     return record, [*failures, *unreadable]
 
 
@@ -445,10 +446,16 @@ class _SweepLoop:
         Failures of points, which are not repeated.
     decks
         The submitted decks.
+    seconds_left
+        Predicted time on one core of what is left of all decks at the last look, s.
+    looked
+        Time of this look, s.
     waiting
         Second halves of failed decks, while no point is finished.
     shares
         Shares of the work of running decks that are done.
+    pace
+        How fast workers are, compared with the predicted times.
     same_failures
         Numbers of failures of points alone, by the name and the cause of the failure.
     done
@@ -464,8 +471,10 @@ class _SweepLoop:
         self.waiting: list[PlannedDeck] = []
         self.shares: dict[PlannedDeck, float] = {}
         self.same_failures: Counter[tuple[str, str]] = Counter()
-        self.start = time.perf_counter()
         self.seconds = sum(seconds_of(plan.decks))
+        self.pace = Pace.of_prediction(self.seconds)
+        self.looked = time.perf_counter()
+        self.seconds_left = self.seconds
         self.finished_before = plan.statuses.count("finished")
         self.done = self.finished_before
 
@@ -557,21 +566,22 @@ class _SweepLoop:
     def _progress(self) -> Progress:
         """The progress of the sweep, by the files of the runs and the predicted times."""
         decks = self._running_decks()
-        self._update_shares(decks)
+        self._look_at(decks)
         share = 1.0
         if self.seconds:
-            share = max(0.0, 1.0 - self._seconds_left() / self.seconds)
+            share = max(0.0, 1.0 - self.seconds_left / self.seconds)
         running = sum(len(deck.points) for deck in decks)
         points = len(self.record.runs)
-        failed = len(self.failures)
-        words = [f"{self.done} of {points} points done, {running} running, {failed} failed"]
+        words = [f"{self.done} of {points} points done"]
         if running and share >= _MEASURING:
             words.append("measuring")
         else:
             words.append(f"{100.0 * share:.0f} % of the work")
-        if 0.0 < share < 1.0:
-            seconds = (1.0 / share - 1.0) * (time.perf_counter() - self.start)
-            words.append(f"{duration_text(seconds)} left")
+        if share < 1.0:
+            words.append(f"{duration_text(self._wall_seconds_left())} left")
+        words.append(f"{running} running")
+        if self.failures:
+            words.append(f"{len(self.failures)} failed")
         return Progress(share, ", ".join(words))
 
     def _running_decks(self) -> list[PlannedDeck]:
@@ -580,20 +590,34 @@ class _SweepLoop:
         first = submitted[: _DECKS_LOOKED_AT * self.plan.options.decks_at_once]
         return [deck for deck in first if is_locked(self._place_of(deck))]
 
-    def _update_shares(self, decks: Sequence[PlannedDeck]) -> None:
-        """Read the progress of running decks; between the segments of a run nothing is known."""
-        for deck in decks:
+    def _look_at(self, running: Sequence[PlannedDeck]) -> None:
+        """Read what running decks have done, and compare it with the time since the last look."""
+        left_before = self.seconds_left
+        for deck in running:
             progress = progress_at(self._place_of(deck), self.plan.cases[deck.points[0]])
-            share = progress.share if progress else 0.0
+            share = progress.share if progress else 0.0  # between segments nothing is known
+            if deck not in self.shares:
+                left_before -= share * deck.seconds  # an interrupted run had done it before
             self.shares[deck] = max(self.shares.get(deck, 0.0), share)
+        self.seconds_left = sum(self._seconds_left_of_decks())
+        now = time.perf_counter()
+        # More is left than before if a deck has failed and is repeated.
+        done = max(0.0, left_before - self.seconds_left)
+        self.pace = self.pace.after(len(running) * (now - self.looked), done)
+        self.looked = now
+
+    def _wall_seconds_left(self) -> float:
+        """Estimated time until the sweep is done, s."""
+        predicted = makespan(self._seconds_left_of_decks(), self.plan.options.decks_at_once)
+        return predicted * self.pace.slowness
+
+    def _seconds_left_of_decks(self) -> list[float]:
+        """For each deck that is not done, the predicted time of what is left of it, s."""
+        left = []
+        for deck in [*self.decks.values(), *self.waiting]:
+            left.append(deck.seconds * (1.0 - self.shares.get(deck, 0.0)))
+        return left
 
     def _place_of(self, deck: PlannedDeck) -> Path:
         """The run directory of the first point of a deck."""
         return self.record.runs_folder / self.record.runs[deck.points[0]]
-
-    def _seconds_left(self) -> float:
-        """Predicted time on one core of what is left of all decks, s."""
-        left = 0.0
-        for deck in [*self.decks.values(), *self.waiting]:
-            left += deck.seconds * (1.0 - self.shares.get(deck, 0.0))
-        return left

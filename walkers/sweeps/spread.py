@@ -45,8 +45,14 @@ from walkers.runs.draws import Draws, Unknown
 from walkers.sweeps.correlations import rank_correlations
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.left_out import LeftOutWarning
-from walkers.sweeps.record import read_sweep_record
-from walkers.sweeps.scheduler import SweepOptions, SweepPlan, plan_sweep, run_sweep
+from walkers.sweeps.record import read_sweep_record, states
+from walkers.sweeps.scheduler import (
+    SweepOptions,
+    SweepPlan,
+    plan_sweep,
+    recorded_failures,
+    run_sweep,
+)
 from walkers.sweeps.table import main_columns, table_of, walking_points
 from walkers.sweeps.workers import Failure
 from walkers.warning import warn_user
@@ -426,6 +432,42 @@ def _band_of(numbers: pd.Series) -> dict[str, float]:
     band = dict(zip(names, ends.tolist(), strict=True))
     band["points"] = int(numbers.count())
     return band
+
+
+def read_spread(run: Path) -> Spread | None:
+    """The spread of a run as `run_spread` has left it.
+
+    None if the run has no spread, or its files cannot be read.
+
+    Parameters
+    ----------
+    run
+        The run directory.
+    """
+    directory = spread_of(run.resolve())
+    try:
+        contents = read_json(directory / SPREAD_NAME)
+        record = read_sweep_record(directory)
+        point_states = states(record)
+        reasons = {state.reason for state in point_states if state.reason}
+        return Spread(
+            directory=run.with_name(directory.name),
+            varied=tuple(_origin_of(value) for value in contents["varied"]),
+            held=tuple(_origin_of(value) for value in contents["held"]),
+            bands=contents["bands"],
+            depends=contents["depends"],
+            counts=contents["counts"],
+            failures=tuple(recorded_failures(record, point_states, reasons)),
+            doubts=contents["doubts"],
+        )
+    except (InputError, OSError, ValueError, KeyError, TypeError):
+        return None
+
+
+def _origin_of(entry: Mapping[str, Any]) -> Origin:
+    """A value of a case, from its entry in the file of a spread."""
+    ends = entry["range"]
+    return Origin(**{**entry, "range": None if ends is None else tuple(ends)})
 
 
 def draws_of(run: Path) -> Draws | None:

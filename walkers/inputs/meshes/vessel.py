@@ -461,8 +461,19 @@ class Vessel:
 
         These are the facets that the engine looks at in each step: their bounding boxes are nearer
         to the surface of the bead than `_NEAR` radii. The beads are placed on the faces at random,
-        always with the same seed.
+        always with the same seed. Vessels remember the numbers: a run asks for one in each look.
         """
+        if radius not in self._facets_near:
+            self._facets_near[radius] = self._mean_facets_near_bead(radius)
+        return self._facets_near[radius]
+
+    @cached_property
+    def _facets_near(self) -> dict[float, float]:
+        """The numbers of `facets_near_bead` so far, by the radius (m)."""
+        return {}
+
+    def _mean_facets_near_bead(self, radius: float) -> float:
+        """Count the facets of `facets_near_bead`."""
         areas = np.linalg.norm(self._area_vectors, axis=1)
         draw = np.random.default_rng(0)
         touched = draw.choice(len(areas), _TOUCHING_BEADS, p=areas / areas.sum())

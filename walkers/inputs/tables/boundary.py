@@ -90,6 +90,8 @@ class Boundary(ConfigTable):
         shape = str(given.get("shape", default))
         if shape == "vessel":
             yield from cls.problems_of(GIVEN_BY, given, place)
+            if "mesh" not in given and "planes" not in given:
+                return  # which sizes it has depends on what it is given by
         elif vessel_keys:
             expected = f"expected none beside {place}.{vessel_keys[0]}"
             yield Problem(key_within(place, "shape"), None, expected)

@@ -17,7 +17,7 @@ def caption(case: Case) -> str:
     --------
     >>> from walkers.inputs.reading import load_case
     >>> caption(load_case("fig4a"))
-    '6 walkers of R = 0.6 / 0.3 mm on a plane of glass, Si AK5; 80 Hz, a0 = 19.6 m/s²'
+    '6 walkers of R = 0.6 / 0.3 mm on a plane of chromium-coated glass, Si AK5; 80 Hz, a0 = 2 g'
     """
     bodies = []
     for kind in case.walkers:
@@ -32,16 +32,13 @@ def caption(case: Case) -> str:
     return f"{', '.join(bodies)} {place}, {liquid_text(case)}; {conditions(case)}"
 
 
-def conditions(case: Case, *, in_given_unit: bool = False) -> str:
+def conditions(case: Case) -> str:
     """Describe the drive of a case and, unless it is level, its tilt and where up is.
 
-    Accelerations are in m/s², or in g if the case gives them so and ``in_given_unit`` is true.
     An example is ``…, plane tilted by 90°, right is up``. Pictures have the drive axis to the
     right: what faces right goes up where that is the steepest way up.
     """
-    texts = {origin.key: origin.text for origin in case.origins}
-    in_g = in_given_unit and accelerations_in_g(texts)
-    drive: str = case.excitation.described(in_g=in_g)
+    drive = drive_text(case)
     tilt = case.boundary.tilted
     if not tilt:
         return drive
@@ -50,6 +47,12 @@ def conditions(case: Case, *, in_given_unit: bool = False) -> str:
     else:
         up = f"up is at {degrees(case.boundary.uphill):.4g}° from x toward y"
     return f"{drive}, {tilt}, {up}"
+
+
+def drive_text(case: Case) -> str:
+    """Describe the drive of a case, with accelerations in m/s², or in g if the case has them so."""
+    texts = {origin.key: origin.text for origin in case.origins}
+    return case.excitation.described(in_g=accelerations_in_g(texts))
 
 
 def liquid_text(case: Case) -> str:

@@ -112,6 +112,10 @@ def not_all_upright(numbers: Mapping[str, Any]) -> bool:
     return "upright" in numbers and bool(numbers["upright"] < numbers["walkers"])
 
 
+AT_REST = "at rest"
+"""State of walkers that are slower than `REST`."""
+
+
 def state(numbers: Mapping[str, Any]) -> str:
     """Describe the state of walkers whose mean velocity is not informative.
 
@@ -145,7 +149,7 @@ def state(numbers: Mapping[str, Any]) -> str:
         clustered = round(walkers * numbers["clustered_share"])
         return f"{slow} of {walkers} walkers slow, {clustered} in clusters"
     if "velocity" in numbers and abs(numbers[headline(numbers)]) < REST:
-        return "at rest"
+        return AT_REST
     return ""
 
 

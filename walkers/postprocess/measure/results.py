@@ -26,6 +26,7 @@ from walkers.postprocess.measure.in_words import motion_in_words
 from walkers.postprocess.measure.measuring_module import MeasuringModule
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.measure.numbers import (
+    AT_REST,
     MAIN_NUMBERS,
     Row,
     headline,
@@ -34,7 +35,9 @@ from walkers.postprocess.measure.numbers import (
     rows,
     short_text,
     state,
+    text_and_unit,
 )
+from walkers.postprocess.measure.sides import REST
 from walkers.postprocess.measure.tables import Columns, read_columns, read_table, write_table
 from walkers.postprocess.measure.uncertainty import (
     accuracy_of,
@@ -416,6 +419,9 @@ def _main_lines(results: Results, *, cached: bool) -> list[str]:
         heading = counted(results.get("beads", 0), "bead")
     if headline(results) == "velocity" and not state(results):
         heading = f"velocity {heading}"
+    if heading == AT_REST:  # beside numbers that are small, but not zero
+        limit, unit = text_and_unit(REST, "m/s")
+        heading += f" (below {limit} {unit})"
     parts = [heading]
     errors = main_errors(results)
     if errors:
@@ -516,7 +522,7 @@ def headlines(results: Results) -> list[str]:
 def drive_text(results: Results) -> str:
     """The drive of a result as its case gives it, with Γ0 and sin δ of dimers."""
     try:
-        drive = conditions(case_of(results.directory), in_given_unit=True)
+        drive = conditions(case_of(results.directory))
     except (OSError, ValueError, KeyError, TypeError):  # the case cannot be read
         drive = results.about["drive"]
     gamma0 = results.get("gamma0", nan)

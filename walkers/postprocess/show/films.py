@@ -21,6 +21,7 @@ from walkers.arrays import FloatArray, IntArray
 from walkers.errors import WalkersError, input_error
 from walkers.extras import require
 from walkers.files import replacing
+from walkers.postprocess.measure.caption import drive_text
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.show.camera import camera_axes, from_above, named_direction
 from walkers.postprocess.show.drawing import check_place
@@ -336,7 +337,7 @@ class _Captions:
             for row, text in enumerate(texts):
                 place = (line, (2.8 + 1.5 * row) * line)
                 draw.text(place, text, _DARK_GREY, self._small, anchor="lt")
-        drive = self._case.excitation.described()
+        drive = drive_text(self._case)
         draw.text((line, self._height - line), drive, _DARK_GREY, self._small, anchor="ls")
 
     def _draw_gravity(self, draw: ImageDraw) -> None:

@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from walkers.errors import check_limits
-from walkers.files import VTK_SCRATCH
+from walkers.files import VTK_SCRATCH, scratch_folder
 from walkers.postprocess.measure import piles
 from walkers.postprocess.measure.clusters import connected
 from walkers.postprocess.measure.motion import Bridges, Motion, read_bridges, read_motion
@@ -89,8 +89,94 @@ def write_vtk(
     if motion.case.boundary.is_open_floor:
         motion = gathered(motion)
     with filled_folder(destination, earlier_files, VTK_SCRATCH) as new:
-        _write_files(new, motion, every or motion.case.run.samples_per_cycle)
+        listed = _write_frames(new, motion, _frames_to_write(motion, every))
+        _write_collection(new, motion, listed)
     return destination / _COLLECTION
+
+
+class GrowingVtk:
+    """A folder of VTK files to which the frames of a run are added while the run goes on.
+
+    Files are written elsewhere and renamed, the ``.pvd`` last: whoever reads it finds all files
+    that it lists.
+
+    Parameters
+    ----------
+    destination, every
+        As of `write_vtk`.
+
+    Attributes
+    ----------
+    collection
+        The ``.pvd`` file.
+    frames
+        Number of frames that are written.
+
+    Raises
+    ------
+    InputError
+        If `write_vtk` would refuse the destination.
+    """
+
+    def __init__(self, destination: Path, *, every: int | None = None) -> None:
+        check_limits("every", every, 1, whole=True)
+        self.collection = destination / _COLLECTION
+        self.frames = 0
+        self._folder = destination
+        self._every = every
+        self._earlier_files = files_of_earlier_export(destination, _names_of_export(destination))
+        self._listed: list[dict[str, str]] = []
+
+    def grow(self, directory: Path) -> None:
+        """Add the frames that are not written yet.
+
+        Parameters
+        ----------
+        directory
+            A measured run directory with all frames so far.
+        """
+        motion = read_motion(directory)
+        frames = _frames_to_write(motion, self._every)
+        self._add(motion, frames[self.frames :])
+
+    def finish(self, directory: Path) -> None:
+        """Write all frames again: which clusters climb is known when the run has ended.
+
+        Parameters
+        ----------
+        directory
+            The directory of the finished run.
+        """
+        self._listed = []
+        motion = read_motion(directory)
+        if motion.case.boundary.is_open_floor:
+            motion = gathered(motion)
+        self._add(motion, _frames_to_write(motion, self._every))
+
+    def _add(self, motion: Motion, frames: Sequence[int]) -> None:
+        """Write frames into the folder, and list them."""
+        if self.frames:
+            with scratch_folder(self._folder.absolute().parent, VTK_SCRATCH) as new:
+                self._write(new, motion, frames)
+                for path in new.iterdir():
+                    if path.name != _COLLECTION:
+                        path.replace(self._folder / path.name)
+                (new / _COLLECTION).replace(self.collection)
+        else:
+            with filled_folder(self._folder, self._earlier_files, VTK_SCRATCH) as new:
+                self._write(new, motion, frames)
+        self.frames = len(_frames_to_write(motion, self._every))
+
+    def _write(self, folder: Path, motion: Motion, frames: Sequence[int]) -> None:
+        """Write frames and the list of these and the earlier ones into a new folder."""
+        self._listed += _write_frames(folder, motion, frames)
+        _write_collection(folder, motion, self._listed)
+
+
+def _frames_to_write(motion: Motion, every: int | None) -> range:
+    """Every ``every``-th frame of the drive; None: one per cycle, or all if these are rarer."""
+    step = every or motion.case.run.samples_per_cycle
+    return range(motion.first_driven, len(motion.time), step)
 
 
 def _names_of_export(folder: Path) -> set[str]:
@@ -104,14 +190,10 @@ def _names_of_export(folder: Path) -> set[str]:
     return {_COLLECTION, SCRIPT, *listed}
 
 
-def _write_files(folder: Path, motion: Motion, every: int) -> None:
-    """Write every ``every``-th frame of the drive, the ``.pvd`` that lists them, and the script."""
-    root = ElementTree.Element(
-        "VTKFile", type="Collection", version="0.1", byte_order="LittleEndian"
-    )
-    root.set("view", json.dumps(_view(motion.driven)))
-    collection = ElementTree.SubElement(root, "Collection")
-    for frame, meshes in _frames(motion, range(motion.first_driven, len(motion.time), every)):
+def _write_frames(folder: Path, motion: Motion, frames: Sequence[int]) -> list[dict[str, str]]:
+    """Write frames of a motion, and return the entries of their files in the ``.pvd``."""
+    listed = []
+    for frame, meshes in _frames(motion, frames):
         for part, (kind, mesh) in enumerate(meshes.items()):
             name = f"{kind}_{frame:06d}.vtu"
             mesh.write(folder / name)
@@ -121,7 +203,19 @@ def _write_files(folder: Path, motion: Motion, every: int) -> None:
                 "name": kind,
                 "file": name,
             }
-            ElementTree.SubElement(collection, "DataSet", entry)
+            listed.append(entry)
+    return listed
+
+
+def _write_collection(folder: Path, motion: Motion, listed: Sequence[dict[str, str]]) -> None:
+    """Write the ``.pvd`` that lists the files of a motion, and the script beside it."""
+    root = ElementTree.Element(
+        "VTKFile", type="Collection", version="0.1", byte_order="LittleEndian"
+    )
+    root.set("view", json.dumps(_view(motion.driven)))
+    collection = ElementTree.SubElement(root, "Collection")
+    for entry in listed:
+        ElementTree.SubElement(collection, "DataSet", entry)
     ElementTree.indent(root)
     ElementTree.ElementTree(root).write(folder / _COLLECTION)
     shutil.copyfile(Path(__file__).with_name("show.py.txt"), folder / SCRIPT)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -25,6 +24,7 @@ from walkers.postprocess.show.necks import (
     neck_surfaces,
     neck_triangles,
 )
+from walkers.postprocess.show.offscreen import prepare_drawing
 from walkers.postprocess.show.scene import Scene, rotations_at
 
 if TYPE_CHECKING:
@@ -96,11 +96,15 @@ class Window:
     ----------
     pixels_per_mm : float
         Resolution of the pictures.
+
+    Raises
+    ------
+    InputError
+        If this machine cannot draw without a screen.
     """
 
     def __init__(self, scene: Scene, size: Sequence[int]) -> None:
-        # Otherwise VTK first tries an X server, and prints an error if there is none.
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+        prepare_drawing()
         import pyvista as pv
 
         width, height = size
