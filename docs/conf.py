@@ -36,7 +36,11 @@ extensions = [
     "generated",
     "texts",
 ]
-exclude_patterns = ["_ext", "examples", "gallery/**.ipynb", "joss"]
+exclude_patterns = ["_ext", "_templates", "examples", "gallery/**.ipynb", "joss"]
+# Tables that pages include.
+for _table in sorted((HERE / "figures").glob("*.md")):
+    if _table.stem != "comparison":
+        exclude_patterns.append(f"figures/{_table.name}")
 default_role = "py:obj"
 nitpicky = False
 
@@ -51,6 +55,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "granular-walkers"
 html_context = {"default_mode": "auto"}
 html_static_path = ["_static"]
+templates_path = ["_templates"]
 html_css_files = ["walkers.css"]
 html_show_sourcelink = False
 html_copy_source = False
@@ -65,7 +70,7 @@ html_theme_options = {
     "show_toc_level": 2,
     "navigation_depth": 3,
     "footer_start": ["copyright"],
-    "footer_end": [],
+    "footer_end": ["project-links"],
     "secondary_sidebar_items": ["page-toc"],
 }
 html_sidebars = {"index": []}
