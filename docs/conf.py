@@ -73,7 +73,8 @@ html_theme_options = {
     "footer_end": ["project-links"],
     "secondary_sidebar_items": ["page-toc"],
 }
-html_sidebars = {"index": []}
+# Pages without a section of their own need no list of its pages.
+html_sidebars = {"index": [], "tutorial": [], "article": []}
 
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"
