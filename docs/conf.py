@@ -62,7 +62,13 @@ html_copy_source = False
 # A browser may not read other pages from disk; docs/_ext/texts.py gives the search their texts.
 html_show_search_summary = False
 html_search_scorer = str(HERE / "_static" / "scorer.js")
+html_favicon = "_static/walker.svg"
 html_theme_options = {
+    "logo": {
+        "text": "granular-walkers",
+        "image_light": "_static/walker.svg",
+        "image_dark": "_static/walker.svg",
+    },
     "navbar_align": "left",
     "navbar_end": ["theme-switcher"],
     "header_links_before_dropdown": 6,
