@@ -36,7 +36,11 @@ extensions = [
     "generated",
     "texts",
 ]
-exclude_patterns = ["_ext", "examples", "gallery/**.ipynb", "joss"]
+exclude_patterns = ["_ext", "_templates", "examples", "gallery/**.ipynb", "joss"]
+# Tables that pages include.
+for _table in sorted((HERE / "figures").glob("*.md")):
+    if _table.stem != "comparison":
+        exclude_patterns.append(f"figures/{_table.name}")
 default_role = "py:obj"
 nitpicky = False
 
@@ -51,13 +55,20 @@ html_theme = "pydata_sphinx_theme"
 html_title = "granular-walkers"
 html_context = {"default_mode": "auto"}
 html_static_path = ["_static"]
+templates_path = ["_templates"]
 html_css_files = ["walkers.css"]
 html_show_sourcelink = False
 html_copy_source = False
 # A browser may not read other pages from disk; docs/_ext/texts.py gives the search their texts.
 html_show_search_summary = False
 html_search_scorer = str(HERE / "_static" / "scorer.js")
+html_favicon = "_static/walker.svg"
 html_theme_options = {
+    "logo": {
+        "text": "granular-walkers",
+        "image_light": "_static/walker.svg",
+        "image_dark": "_static/walker.svg",
+    },
     "navbar_align": "left",
     "navbar_end": ["theme-switcher"],
     "header_links_before_dropdown": 6,
@@ -65,10 +76,11 @@ html_theme_options = {
     "show_toc_level": 2,
     "navigation_depth": 3,
     "footer_start": ["copyright"],
-    "footer_end": [],
+    "footer_end": ["project-links"],
     "secondary_sidebar_items": ["page-toc"],
 }
-html_sidebars = {"index": []}
+# Pages without a section of their own need no list of its pages.
+html_sidebars = {"index": [], "tutorial": [], "article": []}
 
 autodoc_typehints_format = "short"
 autodoc_member_order = "bysource"

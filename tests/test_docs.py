@@ -228,6 +228,23 @@ def test_examples_give_what_they_say(
     assert not failed
 
 
+_SESSION = re.compile(r"^(```|~~~)pycon\n(.+?)^\1$", re.MULTILINE | re.DOTALL)
+"""A Python session on a page."""
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", DOCS / "index.md"], ids=path_in_project)
+def test_sessions_on_the_first_pages_print_what_they_say(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both pages run the case whose picture is `docs/pictures/walker.png`."""
+    monkeypatch.chdir(tmp_path)
+    sessions = [lines for _, lines in _SESSION.findall(page.read_text("utf-8"))]
+    session = doctest.DocTestParser().get_doctest("".join(sessions), {}, page.name, None, 0)
+    assert len(session.examples) > 3
+    assert doctest.DocTestRunner().run(session).failed == 0
+    assert Path("walker.png").stat().st_size > 10_000
+
+
 @pytest.mark.parametrize("name", generated.PAGES)
 def test_generated_pages_of_the_reference_are_todays(name: str) -> None:
     """If this fails, run ``python -m docs._ext.generated``."""
