@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,7 +67,7 @@ GROUPS = (
     Group("the paper's box, 1,630 beads", {"pile-paper": ("0.28, growing, in the box",)}),
 )
 """The conditions of figure and table."""
-SWEEPS = tuple(name for group in GROUPS for name in group.labels)
+SWEEPS = tuple(chain.from_iterable(group.labels for group in GROUPS))
 """The sweeps whose climbs are counted."""
 _CURVES = {
     "Coulomb 0.28": "#9ecae1",
@@ -125,11 +126,11 @@ def write_statistics(name: str, out: Path, docs: Path) -> None:
 
 def statistics_in(docs: Path) -> Statistics:
     """The statistics of all conditions, from the files of their sweeps."""
-    found: Statistics = {}
+    statistics: Statistics = {}
     for group in GROUPS:
         for name, labels in group.labels.items():
-            found |= zip(labels, read_json(docs / file_of(name)), strict=True)
-    return found
+            statistics |= zip(labels, read_json(docs / file_of(name)), strict=True)
+    return statistics
 
 
 def rows_of(statistics: Statistics) -> list[dict[str, str]]:
