@@ -185,7 +185,7 @@ def measure(directory: Path) -> None:
         "version": VERSION,
         "modules": versions,
         "case": case.name,
-        "drive": conditions(case),
+        "drive": conditions(case, in_given_unit=False),
         "rests_on": uncertain_values(case.origins),
         "by_hand": notes,
         "deck_edited": segment.get("deck_edited", False),
@@ -409,17 +409,23 @@ def text(results: Results, *, cached: bool = False, verbose: bool = False) -> st
     return "\n".join(lines)
 
 
-def _main_lines(results: Results, *, cached: bool) -> list[str]:
-    """The case with its main number or state and the errors, in the style of a heading."""
+def main_parts(results: Results) -> list[str]:
+    """The main number of a result or its state, and the errors of this number if there are any.
+
+    Such as ``velocity 1.981 mm/s``, and ``5 to 95 %: 1.2 to 2.4 mm/s``.
+    """
     heading = short_text(results)
     if heading == "-":  # neither walkers nor a pile
         heading = counted(results.get("beads", 0), "bead")
     if headline(results) == "velocity" and not state(results):
         heading = f"velocity {heading}"
-    parts = [heading]
     errors = main_errors(results)
-    if errors:
-        parts.append(errors)
+    return [heading, errors] if errors else [heading]
+
+
+def _main_lines(results: Results, *, cached: bool) -> list[str]:
+    """The case with its main number or state and the errors, in the style of a heading."""
+    parts = main_parts(results)
     line = f"{results.about['case']}: {', '.join(parts)}"
     if cached and not results.about["by_hand"]:  # it was never made by a command
         line += " (already run)"
@@ -516,7 +522,7 @@ def headlines(results: Results) -> list[str]:
 def drive_text(results: Results) -> str:
     """The drive of a result as its case gives it, with Γ0 and sin δ of dimers."""
     try:
-        drive = conditions(case_of(results.directory), in_given_unit=True)
+        drive = conditions(case_of(results.directory))
     except (OSError, ValueError, KeyError, TypeError):  # the case cannot be read
         drive = results.about["drive"]
     gamma0 = results.get("gamma0", nan)
