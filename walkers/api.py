@@ -520,7 +520,7 @@ class Run:
         self,
         to: str | Path | None = None,
         *,
-        size: tuple[int, int] = FilmOptions.size,
+        size: tuple[int, int] | None = None,
         fps: int = FilmOptions.fps,
         slowdown: float | None = None,
         walker: int | None = None,
