@@ -535,7 +535,8 @@ class Run:
         to
             The file, .mp4 or .gif; default: ``film.mp4`` in the run directory.
         size
-            Width and height in pixels.
+            Width and height in pixels; default: 1280 and 720, or as many pixels in the shape of the
+            container.
         fps
             Frames per second.
         slowdown

@@ -417,8 +417,8 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
         along, across = cycles["along"], cycles["across"]
         cycles |= {"distance": along, "along": across, "across": along}
     # Each walker starts with a jump of its own, until its bridges have their shapes.
-    is_settled = cycles["cycle"] == settled_strobes
-    cycles["distance"] = cycles["distance"] - np.repeat(cycles["distance"][is_settled], samples)
+    at_settling = cycles["distance"].reshape(-1, samples)[:, settled_strobes]
+    cycles["distance"] = cycles["distance"] - np.repeat(at_settling, samples)
     if case.meets:
         words["reference"] = "the drive axis"
     if case.boundary.tilted:
