@@ -388,7 +388,7 @@ def front_wall_of(motion: Motion) -> int:
 
 
 def necks_with_a_width(player: Player, frame: int) -> np.ndarray:
-    """Whether necks are wider than 10 µm in the player; each has 160 points, 32 around its start."""
+    """Whether necks are wider than 10 µm in the player: 160 points each, 32 around the start."""
     vertices = player.objects["bridges"].vertices[f"{player.motion.time[frame]:.6f}"]
     points = vertices.reshape(-1, 160, 3)
     return np.asarray(np.ptp(points[:, :32], axis=1).max(axis=1) > 0.01)
