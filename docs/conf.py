@@ -105,6 +105,7 @@ sphinx_gallery_conf = {
     "plot_gallery": True,
     "image_scrapers": ("pictures.scraper", "matplotlib"),  # docs/_ext
     "image_srcset": ["2x"],
+    "reset_modules": ("pictures.use_style",),
 }
 # Annotations name classes that have no page of their own.
 suppress_warnings = ["ref.python"]

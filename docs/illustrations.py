@@ -22,13 +22,14 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from docs import notation, pile_climbs, tables, why_it_walks
+from docs import notation, pile_climbs, sweep_figures, tables, why_it_walks
 from studies import effects, frictions, frictions_by_engine
 from studies.friction_laws import LAWS, calibration_with
 from studies.literature import experiments
@@ -36,14 +37,14 @@ from studies.literature.benchmarks import curve_of, published
 from studies.literature.checks import LITERATURE
 from studies.paper.make import COMPARED, FIGURES, make_figures
 from studies.paper.sources import sweep_of
-from walkers import load_case, run, sweep
+from walkers import Sweep, load_case, run, sweep
 from walkers.api import Changes
 from walkers.arrays import FloatArray
 from walkers.calibration.calibrate import calibrate
 from walkers.calibration.file import load_calibration
 from walkers.calibration.report import write_outcome
 from walkers.errors import InputError, Problem
-from walkers.files import read_json, write_bytes, write_json
+from walkers.files import read_json, replacing, write_bytes, write_json
 from walkers.inputs.sweep import load_sweep
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.results import VERSION, modules_of
@@ -52,6 +53,7 @@ from walkers.postprocess.show.drawing import (
     legend_below,
     letter_panels,
     new_figure,
+    ordered_colours,
     save_figure,
     styled,
 )
@@ -146,9 +148,28 @@ def _picture(
         return [load_case(name, changes)]
 
     def make(out: Path, docs: Path) -> None:
-        run(load_case(name, changes), out).render(docs / file, walker=walker)
+        case = load_case(name, changes)
+        shown = run(case, out)
+        if shown.case.title != case.title:
+            shown = run(case, out, force=True)  # a sweep has made it, with a title of its own
+        shown.render(docs / file, walker=walker)
+        _quantize(docs / file)
 
     return Illustration((file,), cases, make)
+
+
+def _quantize(path: Path) -> None:
+    """Give a PNG a palette of 256 colours, a quarter of its size; its metadata stay."""
+    from PIL import Image, PngImagePlugin
+
+    with Image.open(path) as picture:
+        metadata = PngImagePlugin.PngInfo()
+        for name, text in picture.text.items():
+            metadata.add_itxt(name, text)
+        dots_per_inch = picture.info["dpi"]
+        smaller = picture.convert("RGB").quantize(256, dither=Image.Dither.FLOYDSTEINBERG)
+    with replacing(path) as new:
+        smaller.save(new, format="png", optimize=True, dpi=dots_per_inch, pnginfo=metadata)
 
 
 def _films(gif: str, mp4: str, name: str, changes: Changes) -> Illustration:
@@ -198,8 +219,8 @@ class _SweepFigure:
         What its figure shows, as for `walkers.Sweep.figure`.
     rows
         Gives the rows of its table in the documentation, if it has one.
-    marks_upright
-        Whether its figure shows how many clusters stay upright.
+    draw
+        Draws it in another form.
     """
 
     name: str
@@ -208,7 +229,38 @@ class _SweepFigure:
     hue: str | None = None
     panels: str | None = None
     rows: Callable[[pd.DataFrame], list[dict[str, str]]] | None = None
-    marks_upright: bool = False
+    draw: Callable[[Sweep, _SweepFigure], Figure] | None = None
+
+    def of(self, finished: Sweep) -> Figure:
+        """The figure of a finished sweep."""
+        if self.draw is not None:
+            return self.draw(finished, self)
+        return self.plotted(finished)
+
+    def plotted(self, finished: Sweep) -> Figure:
+        """The figure as `walkers plot` draws it."""
+        return finished.figure(x=self.x, y=self.y, hue=self.hue, panels=self.panels)
+
+
+def _clusters(finished: Sweep, shown: _SweepFigure) -> Figure:
+    """Velocities of clusters above drawings of them."""
+    wall = "corner" if shown.name == "zoo-corner" else "wall"
+    cases = []
+    scatter = []
+    for point in finished.runs:
+        cases.append(point.case)
+        scatter.append(float(point.walkers["axial_velocity"].std()))
+    return sweep_figures.clusters_figure(finished.table(), cases, scatter, wall)
+
+
+def _onset(finished: Sweep, shown: _SweepFigure) -> Figure:
+    """Velocities against friction near the onset of climbing."""
+    return sweep_figures.onset_figure(shown.plotted(finished))
+
+
+def _trays(finished: Sweep, _shown: _SweepFigure) -> Figure:
+    """Shares of walkers in clusters, as means over seeds."""
+    return sweep_figures.trays_figure(finished.table())
 
 
 _SWEEP_FIGURES = (
@@ -219,6 +271,7 @@ _SWEEP_FIGURES = (
         hue="liquid.name",
         panels="contact.roughness.bead_wall",
         rows=tables.least_frictions,
+        draw=_onset,
     ),
     _SweepFigure(
         "climb-corner",
@@ -226,9 +279,10 @@ _SWEEP_FIGURES = (
         x="contact.friction.bead_wall",
         hue="liquid.name",
         rows=tables.least_frictions,
+        draw=_onset,
     ),
-    _SweepFigure("zoo", y="axial_velocity", hue="none", marks_upright=True),
-    _SweepFigure("zoo-corner", y="axial_velocity", marks_upright=True),
+    _SweepFigure("zoo", y="axial_velocity", draw=_clusters),
+    _SweepFigure("zoo-corner", y="axial_velocity", draw=_clusters),
     _SweepFigure(
         "tray-phases",
         y="clustered_share",
@@ -236,6 +290,7 @@ _SWEEP_FIGURES = (
         hue="walkers",
         panels="coverage",
         rows=tables.means_of_trays,
+        draw=_trays,
     ),
 )
 """Sweeps whose figures and tables the documentation shows."""
@@ -251,9 +306,7 @@ def _sweep(shown: _SweepFigure) -> Illustration:
 
     def make(out: Path, docs: Path) -> None:
         finished = sweep(shown.name, out)
-        figure = finished.figure(x=shown.x, y=shown.y, hue=shown.hue, panels=shown.panels)
-        if shown.marks_upright:
-            mark_upright(figure, finished.table())
+        figure = shown.of(finished)
         runs = [point.directory.name for point in finished.runs]
         save_figure(figure, docs / figure_file, runs)
         if shown.rows:
@@ -262,43 +315,6 @@ def _sweep(shown: _SweepFigure) -> Illustration:
 
     files = (figure_file, table_file) if shown.rows else (figure_file,)
     return Illustration(files, cases, make)
-
-
-@styled
-def mark_upright(figure: Figure, table: pd.DataFrame) -> None:
-    """Fill the symbols of clusters by how many of their walkers stay upright.
-
-    Parameters
-    ----------
-    figure
-        The figure of a sweep of clusters, with one line of points.
-    table
-        The table of the sweep, a row for each point.
-    """
-    (axes,) = [panel for panel in figure.axes if panel.lines]
-    (points,) = [line for line in axes.lines if line.get_marker() == "o"]
-    shares = table["upright"].to_numpy(dtype=float) / table["walkers"].to_numpy(dtype=float)
-    places, heights = map(np.asarray, points.get_data())
-    points.set_marker("none")
-    groups = (
-        ("all upright", "full", shares == 1.0),
-        ("some upright", "left", (shares > 0.0) & (shares < 1.0)),
-        ("none upright", "none", shares == 0.0),
-    )
-    for label, fill, in_group in groups:
-        axes.plot(
-            places[in_group],
-            heights[in_group],
-            "ko",
-            label=label,
-            zorder=3,
-            fillstyle=fill,
-            markerfacecoloralt="white",
-            markersize=6.0,
-            clip_on=False,
-        )
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
 
 
 def _write_page(file: Path, command: str, rows: Sequence[Mapping[str, str]]) -> None:
@@ -445,19 +461,37 @@ def _benchmarks() -> Figure:
     The second material of test 4 is left out.
     """
     panels = {key: panel for key, panel in published().items() if not key.startswith("alloy-")}
-    figure = new_figure(TWO_COLUMNS, 11.0)
+    figure = new_figure(TWO_COLUMNS, 7.2)
     grid = figure.subplots(nrows=4, ncols=2)
     for axes, (key, panel) in zip(grid.flat, panels.items(), strict=True):
-        for series, marker in zip(panel["series"], "osD^", strict=False):
+        for series in panel["series"]:
+            marker, colour = _SOURCES[series["name"]]
             x, y = series["points"].T
-            axes.plot(x, y, marker, mfc="none", ms=4.0, label=series["name"])
+            axes.plot(x, y, marker, color=colour, mfc="none", ms=4.0, label=series["name"])
         x, y = curve_of(key)
         axes.plot(x, y, color="k", lw=1.0, label="second engine")
-        axes.set(xlabel=panel["x"], ylabel=panel["y"], title=panel["title"])
+        y_label = panel["y"].replace("-", "−", 1) if panel["y"].startswith("-") else panel["y"]
+        axes.set(xlabel=panel["x"], ylabel=fill(y_label, 20), title=panel["title"])
         axes.set_xscale("log" if key == "spin" else "linear")
-        legend_below(axes, ncols=2)
     letter_panels(grid.flat)
+    shown = {}
+    for axes in grid.flat:
+        handles, labels = axes.get_legend_handles_labels()
+        shown |= dict(zip(labels, handles, strict=True))
+    figure.legend(shown.values(), shown.keys(), loc="outside lower center", ncols=4)
     return figure
+
+
+_SOURCES = {
+    "simulated": ("o", "C0"),
+    "measured": ("s", "C1"),
+    "finite elements": ("D", "C2"),
+    "6: aluminium alloy": ("^", "C3"),
+    "6: nylon": ("v", "C4"),
+    "8: case A": ("P", "C5"),
+    "8: case B": ("X", "C6"),
+}
+"""Symbol and colour of each source of the published points; one of each in all panels."""
 
 
 def _repeated_experiments() -> Illustration:
@@ -496,9 +530,10 @@ def _draw_phases(axes: Axes, drifts: FloatArray) -> None:
     ``drifts`` are over the speed of the first tone, shape (phases, strengths).
     """
     phases = np.arange(0.0, 181.0, 10.0)
+    colours = ordered_colours(len(experiments.STRENGTHS))
     curves = np.array([experiments.coulomb_drift(phase) for phase in phases])
     for number, strength in enumerate(experiments.STRENGTHS):
-        colour = f"C{number}"
+        colour = colours[number]
         label = f"a = {strength:g} · 7/2 μg"
         axes.plot(experiments.PHASES, drifts[:, number], "o", mfc="none", ms=4.0, color=colour)
         axes.plot(phases, curves[:, number], lw=1.0, color=colour, label=label)
@@ -514,7 +549,7 @@ def _draw_strengths(axes: Axes, drifts: FloatArray) -> None:
         colour = f"C{number}"
         measured = -drifts[list(experiments.PHASES).index(phase)] * strengths
         curve = -experiments.coulomb_drift(phase) * strengths
-        label = f"{phase:g}°"
+        label = f"phase of the second tone {phase:g}°"
         axes.plot(strengths, measured, "o", mfc="none", ms=4.0, color=colour, label=label)
         axes.plot(strengths, curve, lw=1.0, color=colour)
     axes.set(xlabel="a/(7/2 μg)", ylabel="drift / (7/2 μg/ω)")
@@ -529,7 +564,7 @@ def _draw_impacts(axes: Axes, bench: Bench) -> None:
     law_with_film = f"{experiments.__file__}:law_with_film"
     curves = {
         "70 GPa": experiments.restitutions(bench),
-        "70 GPa, bridge from the film on": experiments.restitutions(bench, law=law_with_film),
+        "70 GPa, bridge forms at the film": experiments.restitutions(bench, law=law_with_film),
         "50 MPa": experiments.restitutions(bench, modulus=5e7),
     }
     for label, (stokes, restitution) in curves.items():

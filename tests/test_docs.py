@@ -14,19 +14,18 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 import walkers
 from docs._ext import generated
 from docs.illustrations import (
     facts,
-    mark_upright,
     output_of,
     pages_of,
     refreshed,
     stale,
     without_hashes,
 )
+from docs.sweep_figures import clusters_figure, trays_figure
 from studies.paper.make import page_of
 from walkers import load_case
 from walkers.files import read_json
@@ -269,21 +268,35 @@ def test_the_first_velocity_stands_beside_the_curve_of_the_paper() -> None:
     assert f"({curve:.2f} mm/s at this drive, no measured point" in text
 
 
-def test_symbols_of_clusters_are_filled_by_how_many_stay_upright() -> None:
-    """Of six walkers at each of three points, 6, 1 and none stay upright."""
-    figure = Figure()
-    axes = figure.subplots()
-    axes.errorbar([0.0, 1.0, 2.0], [3.0, 4.0, 5.0], marker="o", ls="none")
-    mark_upright(figure, pd.DataFrame({"upright": [6, 1, 0], "walkers": 6}))
+def test_clusters_are_sorted_and_filled_by_how_many_stay_upright() -> None:
+    """Of six walkers at each of four points, none, 6, 1 and 6 stay upright."""
+    table = pd.DataFrame(
+        {"upright": [0, 6, 1, 6], "walkers": 6, "axial_velocity": [5e-3, 2e-3, 4e-3, 3e-3]}
+    )
+    figure = clusters_figure(table, [load_case("climber")] * 4, [1e-4] * 4, "wall")
     symbols = []
-    for line in axes.lines:
+    for line in figure.axes[0].lines:
         if line.get_marker() == "o":
-            symbols.append((line.get_label(), line.get_fillstyle(), list(line.get_ydata())))
-    assert symbols == [
-        ("all upright", "full", [3.0]),
-        ("some upright", "left", [4.0]),
-        ("none upright", "none", [5.0]),
-    ]
+            symbols.append((line.get_fillstyle(), list(line.get_ydata())))
+    assert symbols == [("full", [3.0, 2.0]), ("left", [4.0]), ("none", [5.0])]
+    drawings = figure.axes[0].child_axes
+    assert [len(drawing.patches) for drawing in drawings] == [4, 4, 4, 4]  # beads of the climber
+
+
+def test_means_of_trays_have_bars_from_the_smallest_to_the_largest_seed() -> None:
+    table = pd.DataFrame(
+        {
+            "coverage": 0.05,
+            "walkers": [16, 16, 16, 64],
+            "drive.peak_acceleration": 4.0,
+            "clustered_share": [0.2, 0.3, 0.7, 0.5],
+        }
+    )
+    panel = trays_figure(table).axes[0]
+    means = [float(container.lines[0].get_ydata()[0]) for container in panel.containers]
+    assert means == pytest.approx([0.4, 0.5])
+    (bar,) = panel.containers[0].lines[2][0].get_segments()
+    assert bar[:, 1] == pytest.approx([0.2, 0.7])
 
 
 def imported_from_package(tree: ast.Module) -> set[str]:

@@ -161,12 +161,12 @@ def test_the_legend_has_the_labels_of_files_beside_the_simulation(
 ) -> None:
     path = write(tmp_path, MEASURED, "lab-2026.csv")
     figure = fast.figure(data_files=[path, f"f = 80 Hz={path}"])
-    assert legend_texts(figure) == ["simulation", "lab-2026", "f = 80 Hz"]
+    assert legend_texts(figure) == ["engine", "lab-2026", "f = 80 Hz"]
 
 
 def test_a_file_whose_name_has_an_equals_sign_is_found(fast: walkers.Sweep, tmp_path: Path) -> None:
     figure = fast.figure(data_files=write(tmp_path, MEASURED, "f=80.csv"))
-    assert legend_texts(figure) == ["simulation", "f=80"]
+    assert legend_texts(figure) == ["engine", "f=80"]
 
 
 def test_points_of_categories_stand_at_them(made_sweep: Path, tmp_path: Path) -> None:

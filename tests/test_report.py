@@ -388,10 +388,10 @@ def front_wall_of(motion: Motion) -> int:
 
 
 def necks_with_a_width(player: Player, frame: int) -> np.ndarray:
-    """Whether necks are wider than 10 µm in the player; each has 80 points, 16 around its start."""
+    """Whether necks are wider than 10 µm in the player: 160 points each, 32 around the start."""
     vertices = player.objects["bridges"].vertices[f"{player.motion.time[frame]:.6f}"]
-    points = vertices.reshape(-1, 80, 3)
-    return np.asarray(np.ptp(points[:, :16], axis=1).max(axis=1) > 0.01)
+    points = vertices.reshape(-1, 160, 3)
+    return np.asarray(np.ptp(points[:, :32], axis=1).max(axis=1) > 0.01)
 
 
 def test_necks_of_the_player_are_as_many_as_bridges_at_their_times(player_of_pile: Player) -> None:
@@ -638,8 +638,8 @@ def test_beads_of_a_report_turn_with_the_mouse_and_back(
     second_run = Path(load_table(swept)["run"][1]).name
     page = visit(swept.parent / second_run / "report.html")
     page.wait_for_selector(".scene[data-ready]")
-    as_at_first = page.get_by_role("button", name="as at first")
-    as_at_first.click()
+    reset_view = page.get_by_role("button", name="Reset view")
+    reset_view.click()
     start = rested_picture(page)
 
     def turned_picture() -> bytes | None:
@@ -650,5 +650,5 @@ def test_beads_of_a_report_turn_with_the_mouse_and_back(
 
     wait_for(turned_picture)
     assert page.locator(".time").text_content() == "0.0000 s"
-    as_at_first.click()
+    reset_view.click()
     wait_for(lambda: picture(page) == start)

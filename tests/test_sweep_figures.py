@@ -15,6 +15,7 @@ import pandas as pd
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -143,14 +144,50 @@ def tick_labels(panel: Axes) -> list[str]:
 
 def test_a_figure_keeps_the_colours_of_the_project_wherever_it_is_drawn() -> None:
     """The names C0, C1, … would be looked up in the style of the program that draws it."""
+    rows = list(product(("water", "Si AK5"), (0.1, 0.2)))
+    units = {"liquid.name": "", WALL: ""}
+    table = make_table(units, rows, are_axes=True, velocity=[1e-3, 3e-3, 2e-3, 4e-3])
+    assert [line.get_color() for line in lines_of_series(figure_of(table))] == COLOURS
+
+
+def lines_of_series(figure: Figure) -> list[Line2D]:
+    """The lines with symbols through two points in the only panel of a figure."""
+    lines = []
+    for line in only_panel(figure).lines:
+        if len(line.get_xdata()) == 2 and line.get_marker() != "None":
+            lines.append(line)
+    return lines
+
+
+def test_colours_of_numbers_become_lighter_from_the_smallest_to_the_largest() -> None:
+    rows = list(product((90.0, 60.0, 75.0), (0.1, 0.2)))
+    units = {"drive.frequency": "Hz", WALL: ""}
+    velocity = np.arange(1.0, 7.0) * 1e-3
+    table = make_table(units, rows, are_axes=True, velocity=velocity)
+    figure = figure_of(table, FigureOptions(x=WALL))
+    assert legend_of(figure) == ["60 Hz", "75 Hz", "90 Hz"]
+    lightness = [float(np.mean(to_rgb(line.get_color()))) for line in lines_of_series(figure)]
+    assert lightness == sorted(lightness)
+    assert lightness[2] > lightness[0] + 0.1
+
+
+@pytest.mark.parametrize(
+    ("velocities", "are_nested"),
+    [
+        # Values of 60 Hz, then of 70 Hz. Symbols of 0.02 of the range cover each other.
+        pytest.param([1e-3, 3e-3, 2e-3, 4e-3], False, id="apart"),
+        pytest.param([1e-3, 3e-3, 1.03e-3, 4e-3], True, id="one pair within 1 % of the range"),
+    ],
+)
+def test_filled_symbols_have_different_sizes_only_if_some_cover_each_other(
+    velocities: list[float], are_nested: bool
+) -> None:
     rows = list(product((60.0, 70.0), (0.1, 0.2)))
     units = {"drive.frequency": "Hz", WALL: ""}
-    table = make_table(units, rows, are_axes=True, velocity=[1e-3, 3e-3, 2e-3, 4e-3])
-    colours = []
-    for line in only_panel(figure_of(table)).lines:
-        if len(line.get_xdata()) == 2 and line.get_marker() != "None":
-            colours.append(line.get_color())
-    assert colours == COLOURS
+    table = make_table(units, rows, are_axes=True, velocity=velocities)
+    figure = figure_of(table, FigureOptions(x=WALL))
+    first, second = (line.get_markersize() for line in lines_of_series(figure))
+    assert (first > second) is are_nested
 
 
 @pytest.mark.parametrize(
@@ -158,10 +195,10 @@ def test_a_figure_keeps_the_colours_of_the_project_wherever_it_is_drawn() -> Non
     [
         # Bars are seen if the scatter exceeds 2 % of the range of the velocities, here 0.04 mm/s.
         pytest.param(2e-4, 3, SCATTER, id="0.2 mm/s"),
-        pytest.param(2e-6, 0, f"{SCATTER}, smaller than the symbols", id="0.002 mm/s"),
+        pytest.param(2e-6, 0, "", id="0.002 mm/s"),
     ],
 )
-def test_error_bars_that_symbols_would_hide_are_left_out_and_the_figure_says_so(
+def test_error_bars_that_symbols_would_hide_are_left_out_and_the_title_explains_only_drawn_ones(
     scatter: float, bars: int, title: str
 ) -> None:
     rows = [[60.0], [70.0], [80.0]]
@@ -709,13 +746,18 @@ def velocities_of_theory(runs: Sequence[str]) -> dict[str, list[float]]:
 def test_the_theory_of_a_sweep_is_a_curve_of_each_model_through_its_velocity_at_each_point(
     looked_through: Path,
 ) -> None:
-    """Checked at 80 Hz, whose points have the second colour; the curves span their range."""
+    """Checked at 80 Hz, whose points have the second colour; the curves span their range.
+
+    The paper's fit does not depend on the frequency, and has one curve.
+    """
     sweep = walkers.load(looked_through / "grid")
     figure = sweep.figure(theory=True)
     assert legend_of(figure)[2:] == [FRICTION_MODEL, PAPER_FIT]
     panel = only_panel(figure)
     points = drawn_series(panel)[1].x
-    curves = [line for line in theory_lines(panel) if line.get_color() == COLOURS[1]]
+    at_60_hz, at_80_hz, of_paper = theory_lines(panel)
+    assert at_60_hz.get_color() != at_80_hz.get_color()
+    curves = [at_80_hz, of_paper]
     table = sweep.table()
     velocities = velocities_of_theory(table.loc[table["drive.frequency"] == 80.0, "run"])
     for curve, style, model in zip(curves, ("--", ":"), ("viscous", "paper"), strict=True):
@@ -797,14 +839,11 @@ def test_the_theory_is_a_fine_curve_along_keys_without_a_unit(
 
 
 def assert_curves_span_their_points(panel: Axes) -> None:
-    """Both models have a curve for each series, from its first to its last point."""
-    curves = theory_curves(panel)
-    series = drawn_series(panel)
-    assert len(curves) == 2 * len(series)
-    for number, (x, _) in enumerate(curves):
-        points = series[number // 2].x
+    """The model with friction has a curve for each series, from its first to its last point."""
+    dashed = [line.get_data() for line in theory_lines(panel) if line.get_linestyle() == "--"]
+    for (x, _), series in zip(dashed, drawn_series(panel), strict=True):
         assert len(x) == THEORY_POINTS
-        assert x[[0, -1]] == pytest.approx(points[[0, -1]], rel=1e-9)
+        assert x[[0, -1]] == pytest.approx(series.x[[0, -1]], rel=1e-9)
 
 
 def test_a_curve_along_an_acceleration_that_follows_from_gamma0_is_in_the_unit_of_the_axis(

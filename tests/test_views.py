@@ -437,7 +437,8 @@ def test_gaits_are_smooth_and_go_through_the_samples(
     cycle = np.asarray(line.get_xdata())
     values = np.asarray(line.get_ydata())
     trajectory = read_table(directory, "trajectory").query("walker == 0")
-    samples = trajectory[trajectory["cycle"] >= cycle[0] - 1e-9]
+    first_cycle = trajectory["cycle"].max() - 2.0 + cycle[0]  # the axis begins with these two
+    samples = trajectory[trajectory["cycle"] >= first_cycle - 1e-9]
     assert len(cycle) == 10 * (len(samples) - 1) + 1
     np.testing.assert_allclose(values[::10], 1e3 * samples[name], atol=1e-9)
     bends = np.abs(np.diff(values, 2))
@@ -754,7 +755,7 @@ def test_a_neck_is_where_a_bridge_is_and_gone_when_it_ruptured(rupture: Rupture)
 def test_a_neck_has_the_volume_of_its_bridge(
     gap: float, meniscus: float | None, other: str, motion: Motion
 ) -> None:
-    """Within what spheres differ from parabolas.
+    """Within what polygons differ from circles.
 
     The neck is a body of revolution about the line between its ends, without the caps of the beads.
     """
@@ -789,7 +790,7 @@ def test_a_neck_has_the_volume_of_its_bridge(
     in_first_bead = np.maximum(radius**2 - along**2, 0.0)
     in_second_bead = np.maximum(surface_radius**2 - (length - along) ** 2, 0.0)
     volume = np.pi * np.trapezoid(radii**2 - in_first_bead - in_second_bead, along)
-    assert volume == pytest.approx(surfaces.volume, rel=0.3, abs=0.0)
+    assert volume == pytest.approx(surfaces.volume, rel=0.01, abs=0.0)
 
 
 # --- films ------------------------------------------------------------------------------------

@@ -546,10 +546,20 @@ def first_walker(on_slope: Results) -> pd.DataFrame:
 def test_on_slopes_the_path_is_drawn_as_seen_by_who_goes_up(
     panels: list[Axes], first_walker: pd.DataFrame
 ) -> None:
-    """In mm; what is to the left, the positive side, is drawn on the left."""
+    """In mm; what is to the left, the positive side, is drawn on the left.
+
+    Heights are from the end of settling on, where the grey part of the panel ends.
+    """
     height, _, path = panels
     line = path.lines[0]
-    np.testing.assert_allclose(height.lines[0].get_ydata(), 1e3 * first_walker["along"])
+    along = 1e3 * first_walker["along"].to_numpy()
+    drawn = np.asarray(height.lines[0].get_ydata())
+    np.testing.assert_allclose(np.diff(drawn), np.diff(along), rtol=0.0, atol=1e-9)
+    end_of_settling = float(
+        height.patches[0].get_extents().transformed(height.transData.inverted()).x1
+    )
+    settled = np.abs(first_walker["time"].to_numpy() - end_of_settling).argmin()
+    assert drawn[settled] == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(line.get_xdata(), 1e3 * first_walker["across"])
     np.testing.assert_allclose(line.get_ydata(), 1e3 * first_walker["along"])
     left, right = path.get_xlim()

@@ -521,7 +521,7 @@ class Run:
         self,
         to: str | Path | None = None,
         *,
-        size: tuple[int, int] = FilmOptions.size,
+        size: tuple[int, int] | None = None,
         fps: int = FilmOptions.fps,
         slowdown: float | None = None,
         walker: int | None = None,
@@ -536,7 +536,8 @@ class Run:
         to
             The file, .mp4 or .gif; default: ``film.mp4`` in the run directory.
         size
-            Width and height in pixels.
+            Width and height in pixels; default: 1280 and 720, or as many pixels in the shape of the
+            container.
         fps
             Frames per second.
         slowdown

@@ -12,9 +12,21 @@ from typing import Any
 from sphinx_gallery.scrapers import figure_rst
 
 from walkers.api import Pictures
+from walkers.postprocess.show.drawing import STYLE
 
+_DOTS_PER_INCH = 100
+"""Resolution of figures in the gallery; a screen with small pixels gets twice as many."""
 _LAST_VALUE = "___"
 """The name under which sphinx-gallery keeps the last value of a block."""
+
+
+def use_style(_configuration: dict[str, Any], _example: str) -> None:
+    """Draw the figures of an example in the style of the project, whatever the last one has set."""
+    import matplotlib as mpl
+
+    mpl.rcdefaults()
+    mpl.style.use(STYLE)
+    mpl.rcParams["figure.dpi"] = _DOTS_PER_INCH
 
 
 def scraper(_block: Any, variables: dict[str, Any], configuration: dict[str, Any]) -> str:

@@ -40,6 +40,8 @@ for column, label in contacts.items():
 lower.axhline(0.0, color="0.5", lw=0.8)
 upper.set(ylabel="velocity (mm/s)")
 lower.set(xlabel="cycle", ylabel="gap (µm)")
+upper.set_title("(a) velocities", loc="right")
+lower.set_title("(b) gaps", loc="right")
 for axes in (upper, lower):
     axes.legend(
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, fontsize="small", frameon=False

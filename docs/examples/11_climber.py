@@ -29,7 +29,8 @@ for _, climber in run.trajectory.groupby("walker"):
     heights.plot(time, 1e3 * height)
 angles.set(xlabel="time (s)", ylabel="angle from the vertical (°)", ylim=(1e-4, 20.0))
 heights.set(xlabel="time (s)", ylabel="height climbed (mm)")
-figure.tight_layout()
+angles.set_title("(a)", loc="left")
+heights.set_title("(b)", loc="left")
 plt.show()
 
 # %%

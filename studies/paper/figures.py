@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from contextlib import closing
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from studies.paper.sources import Sources, case_title, ruby, thresholds_with_theory
 from walkers.arrays import FloatArray, IntArray
+from walkers.postprocess.measure.caption import liquid_text, radii_text
 from walkers.postprocess.measure.gait import gait
 from walkers.postprocess.show.camera import axes_toward
 from walkers.postprocess.show.drawing import (
@@ -25,14 +27,15 @@ from walkers.postprocess.show.drawing import (
     styled,
 )
 from walkers.postprocess.show.necks import bridges_at
-from walkers.postprocess.show.scene import Scene
+from walkers.postprocess.show.scene import FloorGrid, Scene
 from walkers.postprocess.show.window import Picture, Window
+from walkers.runner.run_directory import case_of
 from walkers.sweeps.figure import figure_of
 from walkers.sweeps.figure_options import FigureOptions
 from walkers.sweeps.record import read_sweep_record
 from walkers.sweeps.table import table_of
-from walkers.theory.prediction import FRICTION_MODEL, motion_of, predicted_column
-from walkers.theory.quasistatic import translation
+from walkers.theory.prediction import FRICTION_MODEL, PAPER_FIT, motion_of, predicted_column
+from walkers.theory.quasistatic import mean_velocity, translation
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,6 +50,9 @@ _INTERVAL = 0.3
 _IMAGES = 6
 """Fig. 1b: largest number of images."""
 
+_GRID_STEP = 0.5
+"""Fig. 1b: distance of the lines on the floor, which are at the ticks, mm."""
+
 _PIXELS = 120.0
 """Fig. 1b: pixels in the radius of the smallest bead."""
 
@@ -57,22 +63,37 @@ _MEASURED_DASHES = (0, (6, 2, 1, 2))
 """Fig. 4: dashes of the means that the paper measured."""
 
 
+_THEORY_DOTS = 0.1
+"""Fig. 4: distance of the dots of the theory, cycles."""
+
+_PLATEAU = "velocity_6g"
+"""Fig. 2: name of the paper's velocity at the onset of the plateau, 6 g."""
+
+_FAR_FROM_CURVE = 0.3
+"""Fig. 3: distance from the paper's curve from which radii stand above a point, mm/s."""
+
+_SMALL = 7.0
+"""Size of texts beside points, points."""
+
+_BESIDE = 1.0
+"""Threshold: distance of the bars of the two protocols, Hz."""
+
+
 class _Series(NamedTuple):
     """A velocity of Fig. 4 and its look."""
 
     name: str
     column: str
     """Column of its mean in the table of the sweep."""
-    marker: str
     colour: str
-    size: float
-    """Size of the markers, points; different sizes do not hide each other."""
+    width: float
+    """Width of the line, points; different widths do not hide each other."""
 
 
 _SERIES = (
-    _Series("walker", "velocity", "s", "#c4473a", 7.5),
-    _Series("large bead", "rotation_1", "o", "#111111", 5.0),
-    _Series("small bead", "rotation_2", "^", "#1f5fa8", 2.5),
+    _Series("walker, v", "velocity", "C2", 2.4),
+    _Series("large bead, −R₁ dφ₁/dt", "rotation_1", "C0", 1.4),
+    _Series("small bead, −R₂ dφ₂/dt", "rotation_2", "C1", 0.7),
 )
 
 
@@ -137,17 +158,22 @@ def fig1b(sources: Sources) -> Figure:
     view = axes_toward(np.array([0.0, 0.0, 1.0]), trajectory.across_axis)
     pixels_per_metre = _PIXELS / float(trajectory.radii.min())
     bridges = bridges_at(motion, frames)
+    origin = 1e3 * strip.centres[0] @ view[:2, :2]
+    grid = FloorGrid(step=_GRID_STEP, origin=(float(origin[0]), float(origin[1])))
     for image, (panel, frame) in enumerate(zip(axes, frames, strict=True)):
         bounds = strip.bounds(image)
-        scene = Scene(motion, view, 1e3 * bounds[:, 0], 1e3 * bounds[:, 1], shaken=False)
+        scene = Scene(motion, view, 1e3 * bounds[:, 0], 1e3 * bounds[:, 1], shaken=False, grid=grid)
         extents = np.ptp(bounds[:2], axis=1).tolist()
         size = [round(pixels_per_metre * extent) for extent in extents]
         picture = _picture(scene, size, int(frame), bridges[image])
         panel.imshow(picture, extent=strip.extent, interpolation="bilinear")
         panel.set(yticks=[], title=f"{trajectory.time[frame]:.1f} s")
-        panel.axvline(0.0, color="white", lw=0.6, ls=":")
+        panel.axvline(0.0, color="0.4", lw=0.8, ls=":")
         panel.grid(visible=False)
-    axes[-1].set_xlabel("along the shaking axis,\nfrom the centre of mass at the start (mm)")
+        panel.spines[["left", "bottom"]].set_visible(panel is axes[-1])
+        panel.tick_params(bottom=panel is axes[-1])
+    axes[-1].spines["left"].set_visible(False)
+    axes[-1].set_xlabel("x (mm)")
     letter_panels(axes)
     figure.suptitle(f"{case_title(case)}\nan image every {cycles} cycles")
     return figure
@@ -179,17 +205,69 @@ def draw_sweep(sources: Sources, name: str, options: FigureOptions) -> Figure:
     return figure_of(table, options, predicted_column if options.theory else None)
 
 
+@styled
 def fig2(sources: Sources) -> Figure:
-    """Velocity against peak acceleration at several frequencies."""
+    """Velocity against peak acceleration at several frequencies, and the paper's plateau."""
     options = FigureOptions(x="drive.peak_acceleration", hue="drive.frequency", theory=True)
-    return draw_sweep(sources, "fig2", options)
+    figure = draw_sweep(sources, "fig2", options)
+    (axes,) = figure.axes
+    plateau = _observed(_PLATEAU) * 1e3
+    axes.plot([6.0, 10.0], [plateau, plateau], ls=_MEASURED_DASHES, color="0.3", lw=1.0)
+    axes.annotate(
+        "plateau of the paper, from 6 g",
+        (8.0, plateau),
+        xytext=(0.0, 3.0),
+        textcoords="offset points",
+        ha="center",
+        va="bottom",
+        fontsize=_SMALL,
+    )
+    axes.set_xlim(0.0, 10.3)
+    axes.set_ylim(top=plateau + 0.5)
+    return figure
 
 
+def _observed(name: str) -> float:
+    """A number of the paper by the name of its observation, SI units."""
+    (value,) = (fact.value for fact in ruby().file.observations if fact.name == name)
+    assert value is not None  # it is a number of the paper
+    return value
+
+
+@styled
 def fig3(sources: Sources) -> Figure:
-    """Velocity against asymmetry at Γ0 = 0.5."""
-    options = FigureOptions(x="sin_delta", hue="dimers.radii", theory=True)
-    figure = draw_sweep(sources, "fig3", options)
-    figure.axes[0].autoscale(axis="y")  # the paper's curve too, which rises far above the walkers
+    """Velocity against asymmetry at Γ0 = 0.5, with the radii of each pair of beads."""
+    table = sources.finished("fig3")
+    cases = [case_of(Path(directory)) for directory in table["run"]]
+    asymmetry = table["sin_delta"].to_numpy(dtype=float)
+    velocity = table["velocity"].to_numpy(dtype=float) * 1e3
+    gamma0 = float(table["gamma0"].mean())
+    predictions, _ = predicted_column(cases, "velocity")
+    fine = np.linspace(0.0, 1.02 * asymmetry.max(), 100)
+
+    figure = new_figure(ONE_COLUMN, 3.2)
+    axes = figure.subplots()
+    axes.plot(fine, 1e3 * mean_velocity(gamma0, fine), ":", color="0.3", label=PAPER_FIT)
+    theory = predictions[FRICTION_MODEL] * 1e3
+    axes.plot(asymmetry, theory, "_", color="0.3", ms=12, label=FRICTION_MODEL)
+    axes.plot(asymmetry, velocity, "ko", mfc="none", label="engine")
+    style: dict[str, Any] = {"textcoords": "offset points", "fontsize": _SMALL}
+    for place, height, case in zip(asymmetry, velocity, cases, strict=True):
+        distance = abs(height - 1e3 * float(mean_velocity(gamma0, place)))
+        radii = radii_text(case.walkers[0].radii)
+        if distance > _FAR_FROM_CURVE:
+            axes.annotate(radii, (place, height), (0.0, 10.0), ha="center", va="bottom", **style)
+        else:  # to the lower right, away from the curve, which rises
+            axes.annotate(radii, (place, height), (4.0, -4.0), ha="left", va="top", **style)
+    axes.set(
+        xlabel=r"asymmetry $\sin\,\delta$",
+        ylabel="velocity (mm/s)",
+        title=f"$\\Gamma_0$ = {gamma0:.3g}, {liquid_text(cases[0])}; radii in mm",
+        xticks=(0.0, 0.1, 0.2, 0.3),
+        xlim=(-0.04, 0.38),
+        ylim=(-0.6, None),
+    )
+    legend_below(axes)
     return figure
 
 
@@ -212,26 +290,29 @@ def fig2_threshold(sources: Sources) -> Figure:
     figure = new_figure(ONE_COLUMN, 2.8)
     axes = figure.subplots()
     axes.errorbar(
-        frequency,
+        frequency - _BESIDE / 2.0,
         (at_rest + moving) / 2.0,
         (moving - at_rest) / 2.0,
-        fmt="o",
-        mfc="none",
-        label="engine: runs from rest, rest below, motion above",
+        fmt="none",
+        ecolor="C0",
+        capsize=3,
+        label="engine, runs from rest: from rest to motion",
     )
     axes.errorbar(
-        frequency + 1.0,  # beside the other symbol
+        frequency + _BESIDE / 2.0,
         ramp,
         within,
         fmt="s",
+        color="C1",
         mfc="none",
-        label="engine: one run, the drive falls",
+        capsize=3,
+        label="engine, one run: the drive falls until rest",
     )
     axes.plot(frequency, theory, "--", color="0.2", lw=0.9, label=FRICTION_MODEL)
     largest = float(np.nanmax([*moving, *theory]))
     axes.set(xlabel="frequency (Hz)", ylabel=r"threshold of motion $\Gamma_\mathrm{c}$")
     axes.set(xticks=frequency, ylim=(0.0, 1.3 * largest))
-    legend_below(axes)
+    legend_below(axes, title=f"the two are drawn {_BESIDE:g} Hz apart")
     return figure
 
 
@@ -249,9 +330,9 @@ def fig4(sources: Sources) -> Figure:
             trajectory = sources.trajectory(row["run"])
             _draw_cycles(panel, trajectory, row, letter)
             panel.set_title(f"{case_title(trajectory.case)}\n$\\Gamma_0$ = {row['gamma0']:.3g}")
-        panel.plot([], [], color="0.3", lw=0.9, label=FRICTION_MODEL)
+        panel.plot([], [], ".", color="0.3", ms=6.0, label=FRICTION_MODEL)
         panel.plot([], [], color="0.3", lw=1.0, ls=_MEASURED_DASHES, label="measured mean")
-        legend_below(panel, title="means in mm/s")
+        legend_below(panel, title="engine; means in mm/s")
     letter_panels(axes)
     return figure
 
@@ -274,7 +355,7 @@ def _draw_cycles(axes: Axes, trajectory: Group, row: pd.Series[float], letter: s
     computed = _last_cycles(trajectory)
     theory = theory_of_cycles(trajectory)
     samples_per_cycle = trajectory.case.run.samples_per_cycle
-    for series, velocity, line in zip(_SERIES, computed, theory, strict=True):
+    for series, velocity, predicted in zip(_SERIES, computed, theory, strict=True):
         label = f"{series.name}: {row[series.column] * 1e3:.2f}"
         mean = measured.get(f"fig4{letter}_{series.column.removesuffix('_1')}")
         if mean:
@@ -283,23 +364,20 @@ def _draw_cycles(axes: Axes, trajectory: Group, row: pd.Series[float], letter: s
         axes.plot(
             np.arange(len(velocity)) / samples_per_cycle,
             velocity * 1e3,
-            series.marker,
             color=series.colour,
-            ms=series.size,
-            mfc="none",
-            mew=0.8,
+            lw=series.width,
             label=label,
         )
-        axes.plot(
-            np.arange(len(line)) / (len(line) - 1) * _CYCLES,
-            line * 1e3,
-            color=series.colour,
-            lw=0.36 * series.size,
-        )
+        time = np.arange(len(predicted)) / (len(predicted) - 1) * _CYCLES
+        dots = np.arange(0.0, _CYCLES + _THEORY_DOTS / 2.0, _THEORY_DOTS)
+        heights = np.interp(dots, time, predicted * 1e3)
+        axes.plot(dots, heights, ".", color=series.colour, mec="white", mew=0.5, ms=7.0, zorder=3)
     axes.axhline(0.0, color="0.4", lw=0.6)
     axes.set(
         xlabel="time (cycles of the drive)",
-        ylabel=r"velocity; beads: $-R\,\mathrm{d}\varphi/\mathrm{d}t$ (mm/s)",
+        ylabel="velocity (mm/s)",
+        xlim=(0.0, _CYCLES),
+        xticks=np.arange(0.0, _CYCLES + 0.25, 0.5),
     )
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from walkers.arrays import FloatArray
+from walkers.arrays import FloatArray, IntArray
 from walkers.calibration.calibrate import PROPOSED, Outcome
 from walkers.calibration.file import Calibration
 from walkers.calibration.observations import Observation
@@ -25,6 +25,7 @@ from walkers.text import aligned, rendered
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 CALIBRATION_NAME = "calibration.json"
@@ -35,6 +36,8 @@ _HEIGHT_OF_FACT = 0.25
 """Height of the row of a fact in the figure, inches."""
 _HEIGHT_AROUND_FACTS = 1.5
 """Height of the axis and the legend of the figure, inches."""
+_FARTHEST = 3
+"""Largest distance from a fact that the figure shows, in deviations."""
 _MARKERS = "os^DvPX*"
 """Markers of the sets in figures, which are repeated."""
 
@@ -261,30 +264,42 @@ def calibration_summary(record: Mapping[str, Any]) -> str:
 def draw_facts(outcome: Outcome) -> Figure:
     """Distances of numbers from the facts, in deviations.
 
-    Markers are the numbers of the engine at each set; a line is the prediction of a fact that was
-    held out, from 5 to 95 %.
+    Markers are the numbers of the engine at each set; a grey bar is the prediction of a fact that
+    was held out, from 5 to 95 %.
     """
     facts = outcome.calibration.file.observations
     figure = new_figure(TWO_COLUMNS, _HEIGHT_OF_FACT * len(facts) + _HEIGHT_AROUND_FACTS)
     axes = figure.subplots()
     heights = np.arange(len(facts))[::-1]
-    axes.axvspan(-1.0, 1.0, color="0.9", lw=0)
-    for index, (name, numbers) in enumerate(outcome.numbers.items()):
-        marker = _MARKERS[index % len(_MARKERS)]
-        distances = _residuals(facts, numbers)
-        axes.plot(distances, heights, marker, ms=4, mfc="none", ls="none", label=name)
+    axes.axvspan(-1.0, 1.0, color="0.93", lw=0)
     for fact, height in zip(facts, heights, strict=True):
         predicted = outcome.predicted(fact)
         if predicted is not None:
             low = fact.residual(predicted[0])
             high = fact.residual(predicted[2])
-            axes.hlines(height - 0.25, low, high, color="k", lw=1.0)  # below the markers
+            axes.hlines(height, low, high, color="0.7", lw=5.0, zorder=1.5)
+    for index, (name, numbers) in enumerate(outcome.numbers.items()):
+        _draw_set(axes, np.array(_residuals(facts, numbers)), heights, index, name)
+    axes.plot([], [], color="0.7", lw=5.0, label="predicted without the fact, 5 to 95 %")
     axes.set_yticks(heights, [fact.title for fact in facts], fontsize=7)
-    axes.set_xlabel("distance from the fact/deviation (lines: predicted)")
+    axes.set_xlabel("distance from the fact/its deviation; arrows: beyond")
+    axes.set_xticks(range(-_FARTHEST, _FARTHEST + 1))
+    axes.set_xlim(-_FARTHEST - 0.4, _FARTHEST + 0.4)
     axes.set_ylim(-0.8, len(facts) - 0.2)
-    axes.set_xscale("symlog", linthresh=3.0)
     figure.legend(loc="outside upper center", ncols=2)
     return figure
+
+
+def _draw_set(axes: Axes, distances: FloatArray, heights: IntArray, index: int, name: str) -> None:
+    """Draw the distances of a parameter set from the facts; arrows at the ends for far ones."""
+    colour = f"C{index}"
+    near = np.abs(distances) <= _FARTHEST
+    style: dict[str, Any] = {"ms": 4, "mfc": "none", "ls": "none", "color": colour}
+    axes.plot(distances[near], heights[near], _MARKERS[index % len(_MARKERS)], label=name, **style)
+    for marker, is_beyond in ((">", distances > _FARTHEST), ("<", distances < -_FARTHEST)):
+        # Arrows of different sets at the same place are side by side.
+        places = np.sign(distances[is_beyond]) * (_FARTHEST + 0.25 - 0.12 * (index % 3))
+        axes.plot(places, heights[is_beyond], marker, **style)
 
 
 def _residuals(facts: list[Observation], numbers: FloatArray) -> list[float]:

@@ -335,6 +335,17 @@ def with_symbols(text: str) -> str:
     return text
 
 
+def unit_with_symbols(unit: str) -> str:
+    """A unit of case files as a physicist writes it.
+
+    Examples
+    --------
+    >>> unit_with_symbols("um"), unit_with_symbols("g/cm^3"), unit_with_symbols("Hz")
+    ('µm', 'g/cm³', 'Hz')
+    """
+    return with_symbols(f"1 {unit}").removeprefix("1 ")
+
+
 def kind_in(annotations: Iterable[Any]) -> QuantityKind | None:
     """The kind of quantity of a field, by its metadata and annotation; None if it has none."""
     for annotation in annotations:

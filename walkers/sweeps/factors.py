@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from walkers.errors import input_error
+from walkers.inputs.units import unit_with_symbols
 from walkers.postprocess.measure.quantities import declared, is_declared, unit_shown
 from walkers.sweeps.table import key_values, value_text
 from walkers.text import with_unit
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 ROUNDING = 1e-12
 """Share of the largest number below which a number is a rounding error."""
+_SURFACES = {"bead_bead", "bead_wall"}
+"""Last words of the keys of a property of both pairs of surfaces."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +46,8 @@ class Factor:
         Displayed unit of the numbers.
     further_keys
         Keys that change together with it.
+    scope
+        What it is a property of, for labels of axes.
     """
 
     keys: tuple[str, ...]
@@ -53,6 +58,7 @@ class Factor:
     is_log: bool = False
     unit: str = ""
     further_keys: tuple[str, ...] = ()
+    scope: str = ""
 
     @property
     def levels(self) -> list[Any]:
@@ -65,7 +71,8 @@ class Factor:
     @property
     def label(self) -> str:
         """The name with the unit, and below it the keys that change together with it."""
-        label = with_unit(self.name, self.unit)
+        name = f"{self.name} ({self.scope})" if self.scope else self.name
+        label = with_unit(name, unit_with_symbols(self.unit))
         if not self.further_keys:
             return label
         if len(self.further_keys) > 2:
@@ -91,7 +98,7 @@ class Factor:
         """A level as text, with its unit."""
         if not self.is_number:
             return str(level)
-        return f"{self.without_rounding(level):.6g} {self.unit}".strip()
+        return f"{self.without_rounding(level):.6g} {unit_with_symbols(self.unit)}".strip()
 
     def has_level(self, level: Any) -> npt.NDArray[np.bool_]:
         """Which points have a level, shape (N,)."""
@@ -183,7 +190,29 @@ def _named_points(factors: Sequence[Factor]) -> Factor:
 def _with_further_keys(first: Factor, factors: Sequence[Factor]) -> Factor:
     """The first of several factors that change together; its label names the others."""
     further = tuple(key for key in _keys_of(factors) if key not in first.keys)
-    return replace(first, keys=first.keys + further, further_keys=further)
+    keys = first.keys + further
+    property_of_surfaces = _property_of_surfaces(factors)
+    if property_of_surfaces:
+        name = readable_key(property_of_surfaces)
+        return replace(first, keys=keys, name=name, scope="walls and beads")
+    return replace(first, keys=keys, further_keys=further)
+
+
+def _property_of_surfaces(factors: Sequence[Factor]) -> str:
+    """The key of a property, such as friction, that is equal on walls and between beads.
+
+    Empty if the factors are not those of one property of both, or if their values differ.
+    """
+    properties = set()
+    surfaces = set()
+    for factor in factors:
+        name, _, surface = factor.keys[0].rpartition(".")
+        properties.add(name)
+        surfaces.add(surface)
+    values = [list(factor.values) for factor in factors]
+    if surfaces != _SURFACES or len(properties) != 1 or values[0] != values[1]:
+        return ""
+    return properties.pop()
 
 
 def _keys_of(factors: Sequence[Factor]) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from walkers.arrays import FloatArray
 from walkers.errors import expected_of, input_error
 from walkers.inputs.resolving.library import unmeasured
+from walkers.postprocess.measure.caption import common_conditions
 from walkers.postprocess.measure.numbers import draws_text
 from walkers.postprocess.show.drawing import (
     errors_seen,
@@ -43,6 +44,7 @@ from walkers.sweeps.series import (
     draw_series,
     draw_theory,
     own_styles,
+    points_cover,
     points_of,
 )
 from walkers.sweeps.table import FACING_DOWN, SweepTable, default_column, find_name
@@ -119,6 +121,7 @@ def figure_of(
         theory=theory,
         point_files=point_files,
         format=figure_format,
+        conditions=common_conditions(list(table.cases.values())),
     )
     return _draw(content, log)
 
@@ -163,6 +166,8 @@ class _Content:
         The files of the user's own points.
     format
         Width, size of texts and title.
+    conditions
+        What all points have in common, in words.
     """
 
     finished: pd.DataFrame
@@ -172,6 +177,7 @@ class _Content:
     theory: Theory | None
     point_files: Sequence[PointsFile]
     format: FigureFormat
+    conditions: str = ""
 
 
 @dataclass(frozen=True)
@@ -222,7 +228,7 @@ def _drawn(content: _Content, log: str) -> Figure:
     label, points = points_of(finished, column, content.down)
     panels, remark = _panels_of(content)
     panels = _with_own_points(panels, content)
-    colours = Colours.of_factor(content.layout.hue, hollow=theory is not None)
+    colours = _colours_of(content, points["value"].to_numpy(dtype=float))
     styles = own_styles([file.label for file in content.point_files], colours)
     figure, grid = _empty_grid(
         len(panels), content.format, share_x=len(content.layout.x_factors) == 1
@@ -248,11 +254,28 @@ def _drawn(content: _Content, log: str) -> Figure:
         band=band,
         letters=content.format.letters(LEGEND_LETTERS_PER_INCH),
     )
-    title = [finished.attrs["title"], remark, *_remarks(finished, points, band)]
+    title = [
+        finished.attrs["title"],
+        content.conditions,
+        remark,
+        *_remarks(finished, points, band),
+    ]
     if content.format.title is not None:
         title = [content.format.title]
     _draw_title(figure, title, content.format.letters(_LETTERS_PER_INCH))
     return figure
+
+
+def _colours_of(content: _Content, values: FloatArray) -> Colours:
+    """Colours and symbols of the points; filled symbols that cover each other have many sizes."""
+    hue = content.layout.hue
+    if content.theory is not None:
+        return Colours.of_factor(hue, hollow=True)
+    colours = Colours.of_factor(hue, hollow=False)
+    for x in content.layout.x_factors:
+        if x.is_number and points_cover(x, values, colours):
+            return Colours.of_factor(hue, hollow=False, nested=True)
+    return colours
 
 
 def _with_own_points(panels: Sequence[_Panel], content: _Content) -> list[_Panel]:
@@ -363,14 +386,16 @@ def _draw_panel(
     axes: Axes, panel: _Panel, colours: Colours, points: pd.DataFrame, theory: Theory | None
 ) -> None:
     """Draw the points of a panel, those of each colour with the predictions for them."""
+    all_series = []
     for number, (level, style) in enumerate(colours.styles.items()):
         offset = 0.0
         if not panel.x.is_number:
             offset = category_offset(number, len(colours.styles))
         series = Series.of_points(panel.x, colours.points_of_level(level, panel.drawn), offset)
         draw_series(axes, series, points, style, joined=theory is None)
-        if theory is not None:
-            draw_theory(axes, series, theory, style["color"])
+        all_series.append(series)
+    if theory is not None:
+        draw_theory(axes, all_series, theory, [style["color"] for style in colours.styles.values()])
     values = points.drop(columns="error")
     if np.nanmin(values) <= 0.0 <= np.nanmax(values):
         axes.axhline(0.0, color="0.4", lw=0.6, zorder=0)
@@ -417,12 +442,9 @@ def _remarks(finished: pd.DataFrame, points: pd.DataFrame, band: str) -> list[st
     remarks = []
     if band:
         remarks.append(f"{band}; {_NOT_IN_BAND}")
-    if points["error"].notna().any():
+    if errors_seen(points["error"], points["value"]):
         are_varied = bool(band) or not set(unmeasured()).isdisjoint(finished.attrs["varied"])
-        bars = _BARS if are_varied else SCATTER
-        if not errors_seen(points["error"], points["value"]):
-            bars += ", smaller than the symbols"
-        remarks.append(bars)
+        remarks.append(_BARS if are_varied else SCATTER)
     return remarks
 
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from operator import itemgetter
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -12,7 +14,7 @@ import numpy.typing as npt
 
 from walkers.arrays import FloatArray
 from walkers.postprocess.measure.quantities import LABELS, scatter_of
-from walkers.postprocess.show.drawing import errors_seen, plain_text
+from walkers.postprocess.show.drawing import errors_seen, ordered_colours, plain_text
 from walkers.sweeps.factors import Factor, number_factor
 from walkers.sweeps.own_points import OwnPoints
 from walkers.sweeps.predictions import Theory
@@ -38,6 +40,16 @@ _MODEL_MARKERS = ("_", "+")
 """Symbols of the models where points are not joined by lines."""
 _MOST_COLOURS = 10
 """Number of colours in the style of the project."""
+_COMMON_COLOUR = "0.3"
+"""Colour of predictions that are the same for all series, and of models in the legend."""
+_SYMBOL_SIZE = 4.5
+"""Size of symbols, points."""
+_LARGEST_STEP = 0.6
+"""Largest difference of the sizes of symbols that cover each other, points."""
+_SAME_SHARE = 1e-6
+"""Difference of curves that are drawn once, relative to the largest value."""
+_COVERED = 0.02
+"""Distance of two symbols that cover each other, relative to the range of the points."""
 _LARGEST_OFFSET = 0.12
 """Largest distance of the symbols of two colours in a category; categories have the distance 1."""
 LEGEND_LETTERS_PER_INCH = 13.0
@@ -46,8 +58,10 @@ _LETTERS_OF_SYMBOL = 6
 """Space of a symbol in the legend, in letters."""
 _OWN_MARKERS = "Ds^vPX"
 """Symbols of the user's own points."""
-_SIMULATION = "simulation"
-"""Entry of the legend for points of one colour beside the user's own."""
+_UNLIKE_ORDERED = 2
+"""First of the style's colours that is unlike the colours of ordered levels: red."""
+_ENGINE = "engine"
+"""Entry of the legend for points of one colour beside a theory or the user's own points."""
 _BAND_OPACITY = 0.25
 """Opacity of bands, from 0 to 1."""
 
@@ -68,21 +82,41 @@ class Colours:
     styles: Mapping[Any, Style]
 
     @classmethod
-    def of_factor(cls, factor: Factor | None, *, hollow: bool) -> Colours:
-        """The colours of the levels of a factor; symbols are ``hollow`` or filled."""
+    def of_factor(cls, factor: Factor | None, *, hollow: bool, nested: bool = False) -> Colours:
+        """The colours of the levels of a factor.
+
+        Numbers have an order, and their colours become lighter from the smallest to the largest;
+        texts have the different colours of the project's style.
+
+        Parameters
+        ----------
+        factor
+            The factor; None: all points have the same colour.
+        hollow
+            Whether symbols are hollow; otherwise they are filled.
+        nested
+            Whether symbols that are drawn later are smaller, so that points that coincide are seen.
+        """
         levels: list[Any] = factor.levels if factor else [None]
+        colours = _colours(len(levels))
+        if factor is not None and factor.is_number:
+            colours = ordered_colours(len(levels))
+        step = min(_LARGEST_STEP, 4.0 / len(levels)) if nested else 0.0
         styles = {}
-        for number, (level, colour) in enumerate(zip(levels, _colours(len(levels)), strict=True)):
-            # Symbols that are drawn later are smaller, so that those of coinciding points are seen:
-            # by one point a level, or by less if there are many levels.
+        for number, (level, colour) in enumerate(zip(levels, colours, strict=True)):
             later = len(levels) - 1 - number
             styles[level] = {
                 "marker": _MARKERS[number % len(_MARKERS)],
                 "color": colour,
                 "mfc": "none" if hollow else colour,
-                "ms": 4.5 + min(1.0, 4.0 / len(levels)) * later,
+                "ms": _SYMBOL_SIZE + step * later,
             }
         return cls(factor, styles)
+
+    @property
+    def is_ordered(self) -> bool:
+        """Whether the levels have an order, and colours that show it."""
+        return self.factor is not None and self.factor.is_number
 
     def points_of_level(self, level: Any, drawn: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
         """Which of the drawn points have the colour of a level, shape (N,)."""
@@ -181,6 +215,32 @@ def points_of(finished: pd.DataFrame, column: str, down: str | None) -> tuple[st
     return factor.label, points
 
 
+def points_cover(x: Factor, values: FloatArray, colours: Colours) -> bool:
+    """Whether points of different colours cover each other.
+
+    Parameters
+    ----------
+    x
+        The factor on the x axis.
+    values : ndarray, shape (N,)
+        The values of all points, as drawn.
+    colours
+        The colours of the points.
+    """
+    if colours.factor is None:
+        return False
+    near = _COVERED * float(np.nanmax(values) - np.nanmin(values))
+    by_place: dict[Any, list[tuple[float, Any]]] = {}
+    for place, value, level in zip(x.values, values, colours.factor.values, strict=True):
+        by_place.setdefault(place, []).append((value, level))
+    for points in by_place.values():
+        points.sort(key=itemgetter(0))
+        for (lower, lower_level), (higher, higher_level) in pairwise(points):
+            if higher - lower <= near and lower_level != higher_level:
+                return True
+    return False
+
+
 def category_offset(number: int, count: int) -> float:
     """Distance of the symbols of a colour from the middle of their category.
 
@@ -275,6 +335,8 @@ def own_styles(labels: Sequence[str], colours: Colours) -> list[Style]:
         The colours of the points of the sweep.
     """
     used = len(colours.styles)
+    if colours.is_ordered:
+        used = _UNLIKE_ORDERED
     palette = _colours(used + len(labels))
     styles = []
     for number, label in enumerate(labels):
@@ -305,12 +367,50 @@ def draw_own_points(axes: Axes, points: OwnPoints, style: Style) -> None:
     )
 
 
-def draw_theory(axes: Axes, series: Series, theory: Theory, colour: Any) -> None:
-    """Draw the predictions of all models for a series."""
-    x = series.x if series.is_line else None
-    places, models = theory.curves(series.rows, series.places, x)
-    for number, values in enumerate(models.values()):
-        axes.plot(places, values, zorder=1, **_model_style(number, series.is_line, colour))
+def draw_theory(
+    axes: Axes, series: Sequence[Series], theory: Theory, colours: Sequence[Any]
+) -> None:
+    """Draw the predictions of all models for the series of a panel.
+
+    A model that predicts the same for all series is drawn once, in grey.
+
+    Parameters
+    ----------
+    axes
+        The axes of the panel.
+    series
+        The series.
+    theory
+        The predictions.
+    colours
+        The colour of each series.
+    """
+    predictions = []
+    for points in series:
+        x = points.x if points.is_line else None
+        predictions.append(theory.curves(points.rows, points.places, x))
+    for number, model in enumerate(theory.values):
+        curves = [(places, models[model]) for places, models in predictions]
+        shown_colours = list(colours)
+        if len(curves) > 1 and _are_equal(curves):
+            curves = curves[:1]
+            shown_colours = [_COMMON_COLOUR]
+        for (places, values), points, colour in zip(curves, series, shown_colours, strict=False):
+            axes.plot(places, values, zorder=1, **_model_style(number, points.is_line, colour))
+
+
+def _are_equal(curves: Sequence[tuple[FloatArray, FloatArray]]) -> bool:
+    """Whether all curves, given by places and values, are the first one but for rounding errors."""
+    first_places, first_values = curves[0]
+    largest = float(np.nanmax(np.abs(first_values), initial=0.0))
+    for places, values in curves[1:]:
+        if len(places) != len(first_places) or not np.allclose(places, first_places):
+            return False
+        if not np.allclose(
+            values, first_values, rtol=0.0, atol=_SAME_SHARE * largest, equal_nan=True
+        ):
+            return False
+    return True
 
 
 def _model_style(number: int, is_line: bool, colour: Any) -> Style:
@@ -352,15 +452,15 @@ def draw_legend(  # noqa: PLR0913
     from matplotlib.lines import Line2D
 
     handles = _colour_handles(colours)
-    if point_styles and not handles:
+    if (point_styles or models) and not handles:
         (style,) = colours.styles.values()
-        handles.append(Line2D([], [], ls="none", label=_SIMULATION, **style))
+        handles.append(Line2D([], [], ls="none", label=_ENGINE, **style))
     if down:
         handles.append(Line2D([], [], ls="none", **_UP))
         handles.append(Line2D([], [], ls="none", mfc="none", **_DOWN))
     line_styles = _line_styles(figure)
     for number, model in enumerate(models):
-        style = _model_style(number, _MODEL_LINES[number] in line_styles, "0.3")
+        style = _model_style(number, _MODEL_LINES[number] in line_styles, _COMMON_COLOUR)
         handles.append(Line2D([], [], label=model, **style))
     if band:
         handles.append(Line2D([], [], lw=5.0, alpha=_BAND_OPACITY, color="0.3", label=band))

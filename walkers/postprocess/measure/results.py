@@ -188,7 +188,7 @@ def measure(directory: Path) -> None:
         "version": VERSION,
         "modules": versions,
         "case": case.name,
-        "drive": conditions(case),
+        "drive": conditions(case, in_given_unit=False),
         "rests_on": uncertain_values(case.origins),
         "by_hand": notes,
         "deck_edited": segment.get("deck_edited", False),
@@ -412,8 +412,11 @@ def text(results: Results, *, cached: bool = False, verbose: bool = False) -> st
     return "\n".join(lines)
 
 
-def _main_lines(results: Results, *, cached: bool) -> list[str]:
-    """The case with its main number or state and the errors, in the style of a heading."""
+def main_parts(results: Results) -> list[str]:
+    """The main number of a result or its state, and the errors of this number if there are any.
+
+    Such as ``velocity 1.981 mm/s``, and ``5 to 95 %: 1.2 to 2.4 mm/s``.
+    """
     heading = short_text(results)
     if heading == "-":  # neither walkers nor a pile
         heading = counted(results.get("beads", 0), "bead")
@@ -422,10 +425,13 @@ def _main_lines(results: Results, *, cached: bool) -> list[str]:
     if heading == AT_REST:  # beside numbers that are small, but not zero
         limit, unit = text_and_unit(REST, "m/s")
         heading += f" (below {limit} {unit})"
-    parts = [heading]
     errors = main_errors(results)
-    if errors:
-        parts.append(errors)
+    return [heading, errors] if errors else [heading]
+
+
+def _main_lines(results: Results, *, cached: bool) -> list[str]:
+    """The case with its main number or state and the errors, in the style of a heading."""
+    parts = main_parts(results)
     line = f"{results.about['case']}: {', '.join(parts)}"
     if cached and not results.about["by_hand"]:  # it was never made by a command
         line += " (already run)"

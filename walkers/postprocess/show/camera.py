@@ -22,6 +22,10 @@ _ELEVATION = radians(60.0)
 """Elevation of the camera above an open floor."""
 _ELEVATION_OF_ONE = radians(35.0)
 """Elevation of the camera above an open floor for one walker that is seen from its side."""
+ANGLE_OF_VIEW = 15.0
+"""Angle of view of a perspective, degrees."""
+_TOWARD_CONTAINER = (-0.3, -1.0, 0.22)
+"""Direction toward the camera of a perspective of a container."""
 
 
 def against_gravity(motion: Motion) -> FloatArray:
@@ -88,6 +92,11 @@ def camera_axes(motion: Motion) -> FloatArray:
     left = np.cross([0.0, 0.0, 1.0], forward)
     toward = np.array([0.0, 0.0, sin(elevation)]) - cos(elevation) * left
     return axes_toward(toward, against_gravity(motion))
+
+
+def oblique_axes(motion: Motion) -> FloatArray:
+    """The axes (`axes_toward`) of a perspective of a container, which shows its depth."""
+    return axes_toward(np.array(_TOWARD_CONTAINER), against_gravity(motion))
 
 
 def plan_axes(motion: Motion, right: FloatArray) -> FloatArray:

@@ -29,11 +29,16 @@ TWO_COLUMNS = 7.0
 """Width of a figure in two columns of a journal, inches."""
 FORMATS = ("png", "svg", "pdf")
 """Formats of figures."""
-_STYLE = Path(__file__).parent / "style.mplstyle"
+STYLE = Path(__file__).parent / "style.mplstyle"
+"""Style of all figures, for matplotlib."""
 _SOFTWARE = "granular-walkers"
 """Name of the program in the metadata of figures."""
 _LEAST_ERROR = 0.02
 """Half of the height of a symbol over the height of its axes, approximately."""
+_ORDERED_COLOURS = "viridis"
+"""Colour map of ordered values, whose lightness rises from the smallest to the largest."""
+_LIGHTEST = 0.78
+"""Largest place in this colour map, of 1: yellow is hardly seen on white."""
 _BELOW_AXES = 30.0
 """Distance of a legend below its axes, points: space for tick labels and the label of x."""
 _POINTS_PER_INCH = 72.0
@@ -48,10 +53,21 @@ def styled(draw: Callable[_Arguments, _Result]) -> Callable[_Arguments, _Result]
     def draw_in_style(*args: _Arguments.args, **kwargs: _Arguments.kwargs) -> _Result:
         import matplotlib.style
 
-        with matplotlib.style.context(_STYLE):
+        with matplotlib.style.context(STYLE):
             return draw(*args, **kwargs)
 
     return draw_in_style
+
+
+def ordered_colours(number: int) -> list[str]:
+    """Colours that become lighter, for ordered values; a single one is the first of the style."""
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    if number == 1:
+        return [to_hex("C0")]
+    colours = colormaps[_ORDERED_COLOURS](np.linspace(0.0, _LIGHTEST, number))
+    return [to_hex(colour) for colour in colours]
 
 
 def plain_text(text: str) -> str:

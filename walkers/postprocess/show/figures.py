@@ -84,14 +84,14 @@ FIGURES: Mapping[str, Sequence[Panel]] = {
             x="time",
             y=("distance",),
             lines="walker",
-            title="Distance {direction}; grey: settling",
+            title="Distance {direction} since settling (grey)",
         ),
         Panel(
             table="cycles",
             x="time",
             y=("orientation",),
             lines="walker",
-            title="Orientation from {reference}",
+            title="Angle to {reference}",
         ),
         Panel(
             table="cycles",
@@ -148,7 +148,7 @@ FIGURES: Mapping[str, Sequence[Panel]] = {
 """The panels of each figure, from top to bottom."""
 MOST_NAMED = 12
 """Largest number of lines in a legend."""
-_SMALLEST_RANGES = {"m": 0.01, "rad": 0.1, "m/s": 0.01}
+_SMALLEST_RANGES = {"m": 0.1, "rad": 0.1, "m/s": 0.01}
 """Smallest ranges of axes by the unit of the column, in the units of the axes: mm, ° and mm/s.
 Otherwise rounding errors would look like motion."""
 _TITLE_LETTERS = 100
@@ -405,26 +405,30 @@ def walk_figure(case: Case, tables: Tables) -> Figure:
     starts = _starts(case, cycles, walkers)
     samples = len(cycles["cycle"]) // len(starts.turn)
     cycles["orientation"] = cycles["orientation"] - np.repeat(starts.turn, samples)
+    settled_strobes = case.for_cycles(int(cycles["cycle"].max())).run.settled_strobes
     looks = line_styles(_walk_labels(case, walkers, starts))
     words = {
         "direction": "along the heading",
-        "reference": "the direction that the legend names",
+        "reference": "the starting direction that the legend names",
         "seen": "seen from above",
     }
     if uphill:
         words["direction"] = "uphill"
         along, across = cycles["along"], cycles["across"]
         cycles |= {"distance": along, "along": across, "across": along}
+    # Each walker starts with a jump of its own, until its bridges have their shapes.
+    at_settling = cycles["distance"].reshape(-1, samples)[:, settled_strobes]
+    cycles["distance"] = cycles["distance"] - np.repeat(at_settling, samples)
     if case.meets:
         words["reference"] = "the drive axis"
     if case.boundary.tilted:
         words["seen"] = f"{case.boundary.tilted}, seen along its normal"
     figure, panels = _draw_figure("walk", case, {"cycles": cycles}, [looks] * 3, words)
     distance, orientation, paths = panels
-    measured = case.for_cycles(int(cycles["cycle"].max()))
-    settled = cycles["time"][measured.run.settled_strobes]
+    settled = cycles["time"][settled_strobes]
     for axes in (distance, orientation):
         axes.axvspan(0.0, float(settled), color="0.93", zorder=0)
+        axes.set_xlim(left=0.0)
     if uphill:
         paths.invert_xaxis()  # left in the picture is to the left of a walker that goes up
         paths.set(xlabel="across the slope, to the left (mm)", ylabel="uphill (mm)")
@@ -471,7 +475,8 @@ def gait_figure(case: Case, tables: Tables) -> Figure:
     names = ["velocity"]
     names += [name for name in trajectory if matches("rotation_*", name)]
     names = [name for name in names if np.isfinite(trajectory[name][last]).all()]
-    smooth = _smooth({name: trajectory[name][last] for name in ("cycle", *names)}, "cycle")
+    smooth = dict(_smooth({name: trajectory[name][last] for name in ("cycle", *names)}, "cycle"))
+    smooth["cycle"] = smooth["cycle"] - (smooth["cycle"][-1] - 2.0)
     looks: list[Look] = []
     widths = np.linspace(6.0, 1.1, len(names))  # thinner lines lie upon thicker ones: all are seen
     for line, name in enumerate(names):
@@ -486,8 +491,12 @@ def gait_figure(case: Case, tables: Tables) -> Figure:
     words = {"number": number}
     figure, (axes,) = _draw_figure("gait", case, {"trajectory": smooth}, [looks], words)
     axes.axhline(0.0, color="0.4", lw=0.6)
+    axes.axhline(
+        1e3 * walkers["velocity"][0], color="0.4", lw=0.9, ls="--", label="mean velocity of the run"
+    )
+    axes.set_xlabel("time in the last two cycles (cycles)")
     axes.set_ylabel("velocity relative to the substrate;\nbeads: −R dφ/dt (mm/s)")
-    axes.set_xlim(smooth["cycle"][-1] - 2.0, smooth["cycle"][-1] + 0.02)
+    axes.set_xlim(0.0, 2.02)
     _add_legend(figure, [axes])
     return figure
 
@@ -655,8 +664,8 @@ def _draw_edge(axes: Axes, case: Case) -> None:
 def climb_figure(case: Case, tables: Tables) -> Figure:
     """Draw heights of clusters' leaders and of the surface, events, segregation, and bridges."""
     clusters = tables("clusters")
-    members = tables("members")
-    bed = tables("bed")
+    members = _driven(tables("members"))
+    bed = _driven(tables("bed"))
     leader_of_track = np.append(clusters["leader"], -1)
     is_leader = members["bead"] == leader_of_track[members["track"]]
     leaders = {name: values[is_leader] for name, values in members.items()}
@@ -668,14 +677,21 @@ def climb_figure(case: Case, tables: Tables) -> Figure:
     figure, panels = _draw_figure("climb", case, {"members": leaders, "bed": bed}, looks, {})
     heights, _, bridges_panel = panels
     _draw_surface(heights, bed)
-    _draw_events(heights, tables("events"))
+    _draw_events(heights, _driven(tables("events")))
     bridges_panel.set_ylabel("number per bead")
     bridges_panel.axhline(0.0, color="0.4", lw=0.6)
     for axes in panels:
+        axes.set_xlim(left=0.0)
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), borderaxespad=0.0)
     letter_panels(panels)
     figure.align_ylabels()
     return figure
+
+
+def _driven(columns: Columns) -> Columns:
+    """The rows of a table from the start of the drive on; before, the beads fall."""
+    is_driven = columns["time"] >= 0.0
+    return {name: values[is_driven] for name, values in columns.items()}
 
 
 def _leader_looks(clusters: Columns, tracks: IntArray) -> list[Look]:

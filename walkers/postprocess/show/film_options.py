@@ -15,7 +15,9 @@ _NUMBER = re.compile(r"[\d.]+(e[-+]?\d+)?", re.IGNORECASE)
 """A number without a unit."""
 _PIXELS = re.compile(r"(\d{2,4})x(\d{2,4})")
 """Width and height in pixels."""
-_SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": (1280, 720), "1080p": (1920, 1080)}
+USUAL_SIZE = (1280, 720)
+"""Width and height in pixels of a film that is not of a container from the side."""
+_SIZES = {"360p": (640, 360), "480p": (854, 480), "720p": USUAL_SIZE, "1080p": (1920, 1080)}
 """Names of sizes: width and height in pixels."""
 _LEAST_SIZE = 64
 """Smallest width and height, pixels."""
@@ -54,6 +56,14 @@ def _read_seconds(_type: Any, tokens: Any) -> float:
         raise input_error(option, f'{text!r}: expected a time such as "0.1 s"') from error
 
 
+def _check_size(size: object) -> None:
+    """Raise `InputError` for a size that is not a width and a height in pixels."""
+    if not isinstance(size, Sequence) or len(size) != 2:
+        raise input_error("size", f"{size!r}: expected width and height, in pixels")
+    for pixels in size:
+        check_limits("size", pixels, _LEAST_SIZE, whole=True)
+
+
 Seconds = Annotated[float, Parameter(converter=_read_seconds, metavar="TIME")]
 """A time, s; the program reads it with its unit."""
 
@@ -67,7 +77,7 @@ class FilmOptions:
     ----------
     size
         Film: width and height in pixels; as an option 360p, 480p, 720p, 1080p, or pixels such as
-        1280x720.
+        1280x720; default: 720p, or as many pixels in the shape of the container.
     fps
         Film: frames per second.
     slowdown
@@ -83,9 +93,9 @@ class FilmOptions:
     """
 
     size: Annotated[
-        tuple[int, int],
-        Parameter(converter=_read_size, n_tokens=1, metavar="SIZE", show_default=lambda _: "720p"),
-    ] = _SIZES["720p"]
+        tuple[int, int] | None,
+        Parameter(converter=_read_size, n_tokens=1, metavar="SIZE", show_default=False),
+    ] = None
     fps: int = 25
     slowdown: float | None = None
     walker: int | None = None
@@ -94,10 +104,8 @@ class FilmOptions:
 
     def __post_init__(self) -> None:
         """Check what does not depend on a run."""
-        if not isinstance(self.size, Sequence) or len(self.size) != 2:
-            raise input_error("size", f"{self.size!r}: expected width and height, in pixels")
-        for pixels in self.size:
-            check_limits("size", pixels, _LEAST_SIZE, whole=True)
+        if self.size is not None:
+            _check_size(self.size)
         check_limits("fps", self.fps, 1, 60)
         check_limits("slowdown", self.slowdown, 0.05, 1e4)
         check_limits("walker", self.walker, whole=True)

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
-from math import ceil, log10
+from math import ceil, log10, sqrt
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,11 +21,19 @@ from walkers.arrays import FloatArray, IntArray
 from walkers.errors import WalkersError, input_error
 from walkers.extras import require
 from walkers.files import replacing
-from walkers.postprocess.measure.caption import drive_text
+from walkers.postprocess.measure.caption import drive_description
 from walkers.postprocess.measure.motion import Motion, read_motion
-from walkers.postprocess.show.camera import camera_axes, from_above, named_direction
+from walkers.postprocess.show.camera import (
+    ANGLE_OF_VIEW,
+    camera_axes,
+    from_above,
+    from_the_side,
+    named_direction,
+    oblique_axes,
+)
 from walkers.postprocess.show.drawing import check_place
-from walkers.postprocess.show.film_options import FilmOptions
+from walkers.postprocess.show.film_options import USUAL_SIZE, FilmOptions
+from walkers.postprocess.show.marks import DRIVE_COLOUR, seen_directions
 from walkers.postprocess.show.meshes import round_below
 from walkers.postprocess.show.necks import bridges_at, bridges_text
 from walkers.postprocess.show.scene import Scene, motion_in_view
@@ -37,6 +45,12 @@ if TYPE_CHECKING:
 
 _EXTENT_FACTOR = 1.2
 """Extent of the picture over that of the paths of the beads."""
+_EXTENT_FACTOR_OF_CONTAINER = 1.04
+"""Extent of the view of a container from the side over that of the container."""
+_HEIGHT_OF_TEXTS = 0.14
+"""Usual height of the texts above and below a container over its height."""
+_SMALLEST_ASPECT = 0.4
+"""Smallest usual width over height of a film."""
 _TRAY_EXTENT_FACTOR = 1.3
 """Extent of the picture over that of a tray."""
 _LONGEST_FILM = 10.0
@@ -105,21 +119,25 @@ def render_film(
     if is_gif:
         _check_gif(options)
     else:
-        _check_mp4(options)
+        _check_mp4(options.size)
         require("film")  # ffmpeg; Pillow, which is always installed, writes a GIF
     # Whether a walker is alone in view matters only to series of pictures.
     motion, _ = motion_in_view(read_motion(directory).driven, options.walker)
     times = film_times(motion, options)
-    scene = _scene_of(motion, times, options)
+    size = options.size or _usual_size(motion, times)
+    scene = _scene_of(motion, times, size)
+    captions = _Captions(scene, times, size)
+    if from_the_side(motion.case):
+        scene = captions.scene_between_texts()
+        captions = _Captions(scene, times, size)
     bridges = bridges_at(motion, times.frame)
     path.parent.mkdir(parents=True, exist_ok=True)
-    with closing(Window(scene, options.size)) as window, replacing(path) as new:
-        captions = _Captions(scene, times, window.pixels_per_mm, options.size)
+    with closing(Window(scene, size)) as window, replacing(path) as new:
         film = _Film(window, captions, times, bridges)
         if is_gif:
             _write_gif(new, film, options.fps, on_progress)
         else:
-            _write_mp4(new, film, options, on_progress)
+            _write_mp4(new, film, size, options.fps, on_progress)
     return path
 
 
@@ -129,9 +147,11 @@ def _check_gif(options: FilmOptions) -> None:
         raise input_error("fps", f"{options.fps}: expected 1, 2, 4, 5, 10, 20, 25 or 50 for a GIF")
 
 
-def _check_mp4(options: FilmOptions) -> None:
-    """Raise `InputError` for a size that an MP4 cannot have."""
-    width, height = options.size
+def _check_mp4(size: tuple[int, int] | None) -> None:
+    """Raise `InputError` for a chosen size that an MP4 cannot have."""
+    if size is None:
+        return
+    width, height = size
     if width % 2 or height % 2:
         raise input_error("size", f"{width}x{height}: expected even numbers for an MP4")
 
@@ -206,14 +226,47 @@ def _default_slowdown(motion: Motion, duration: float) -> float:
     return max(1.0, round_below(largest))
 
 
-def _scene_of(motion: Motion, times: FilmTimes, options: FilmOptions) -> Scene:
+def _usual_size(motion: Motion, times: FilmTimes) -> tuple[int, int]:
+    """Width and height of a film in pixels, even numbers, if the user has chosen none.
+
+    A film of a container from the side has the shape of the container and of the texts above and
+    below it, so that there is nothing empty beside it.
+    """
+    if not from_the_side(motion.case):
+        return USUAL_SIZE
+    view = _view_from_the_side(motion, _frames_of(times))
+    width, height, _ = view.high - view.low
+    aspect = float(width / height) / (1.0 + _HEIGHT_OF_TEXTS)
+    aspect = min(max(aspect, _SMALLEST_ASPECT), USUAL_SIZE[0] / USUAL_SIZE[1])
+    pixels = USUAL_SIZE[0] * USUAL_SIZE[1]
+    width_in_pixels = 2 * round(sqrt(pixels * aspect) / 2.0)
+    return width_in_pixels, 2 * round(pixels / width_in_pixels / 2.0)
+
+
+def _frames_of(times: FilmTimes) -> slice:
+    """The frames between the first and the last picture."""
+    return slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
+
+
+def _view_from_the_side(motion: Motion, frames: slice) -> Scene:
+    """The view of a container in perspective, with its walls."""
+    view = Scene.around(motion, oblique_axes(motion), 1.0, frames).with_walls(frames)
+    margin = (_EXTENT_FACTOR_OF_CONTAINER - 1.0) / 2.0 * (view.high - view.low)
+    return replace(
+        view, low=view.low - margin, high=view.high + margin, angle_of_view=ANGLE_OF_VIEW
+    )
+
+
+def _scene_of(motion: Motion, times: FilmTimes, size: tuple[int, int]) -> Scene:
     """The view of a film, in which the beads stay from its first to its last picture."""
-    width, height = options.size
-    frames = slice(int(times.frame[0]), ceil(times.frame[-1]) + 1)
-    extent_factor = _TRAY_EXTENT_FACTOR if from_above(motion.case) else _EXTENT_FACTOR
-    view_of_path = Scene.around(motion, camera_axes(motion), extent_factor, frames)
-    view_of_path = replace(view_of_path, rolling=True)
-    return view_of_path.following(width / height, _EXTENT_FACTOR, frames)
+    width, height = size
+    frames = _frames_of(times)
+    if from_the_side(motion.case):
+        view = _view_from_the_side(motion, frames)
+    else:
+        extent_factor = _TRAY_EXTENT_FACTOR if from_above(motion.case) else _EXTENT_FACTOR
+        view = Scene.around(motion, camera_axes(motion), extent_factor, frames)
+    return replace(view, rolling=True).following(width / height, _EXTENT_FACTOR, frames)
 
 
 @dataclass(frozen=True)
@@ -266,15 +319,11 @@ class _Captions:
         The scene that pictures show.
     times
         Times of the pictures.
-    pixels_per_mm
-        Resolution of the pictures.
     size
         Their width and height in pixels.
     """
 
-    def __init__(
-        self, scene: Scene, times: FilmTimes, pixels_per_mm: float, size: tuple[int, int]
-    ) -> None:
+    def __init__(self, scene: Scene, times: FilmTimes, size: tuple[int, int]) -> None:
         from matplotlib import get_data_path
         from PIL import ImageFont
 
@@ -291,8 +340,9 @@ class _Captions:
         # All pictures may show the same frame; then the interval is zero.
         interval = float(np.diff(times.time).max(initial=0.0)) or 1.0
         self._decimals = max(0, ceil(-log10(interval) - 1e-9))
-        self._bar = round_below(self._width / 5.0 / pixels_per_mm)  # mm
-        self._bar_pixels = self._bar * pixels_per_mm
+        mm_per_pixel = scene.height(self._width / self._height) / self._height
+        self._bar = round_below(mm_per_pixel * self._width / 5.0)  # mm
+        self._bar_pixels = self._bar * scene.shortening / mm_per_pixel
         self._stroke = max(2, self._line // 8)
 
     def draw_into(self, picture: Picture, number: int) -> Picture:
@@ -323,22 +373,85 @@ class _Captions:
         texts += bridges_text(self._case).split(", ")
         return texts
 
+    def _rows(self, number: int) -> list[str]:
+        """The texts below the time in rows: one each, or of a container as wide as the picture."""
+        texts = self._texts(number)
+        if not from_the_side(self._case):
+            return texts
+        rows: list[str] = []
+        for text in texts:
+            longer = f"{rows[-1]}, {text}" if rows else text
+            if rows and self._small.getlength(longer) <= self._width - 2 * self._line:
+                rows[-1] = longer
+            else:
+                rows.append(text)
+        return rows
+
+    @property
+    def _height_above(self) -> float:
+        """Height of the texts above a container, pixels."""
+        rows = max(len(self._rows(0)), len(self._rows(len(self._times.time) - 1)))
+        return (2.8 + 1.5 * rows) * self._line
+
+    def scene_between_texts(self) -> Scene:
+        """The scene with space above and below for the texts, which cover nothing of it."""
+        line = self._line
+        above = self._height_above
+        below = 2.5 * line
+        width, height, _ = self._scene.high - self._scene.low
+        mm_per_pixel = max(height / (self._height - above - below), width / self._width)
+        low = self._scene.low.copy()
+        high = self._scene.high.copy()
+        low[1] -= mm_per_pixel * below
+        high[1] = low[1] + mm_per_pixel * self._height
+        return replace(self._scene, low=low, high=high)
+
     def _draw_texts(self, draw: ImageDraw, number: int) -> None:
         """Write time, slow motion and legend at the top, and the drive at the bottom."""
         line = self._line
         clock = f"{self._times.time[number]:.{self._decimals}f} s"
+        if from_the_side(self._case):
+            # The walls of a container that is open at the top reach beyond the picture.
+            draw.rectangle([0.0, 0.0, self._width, self._height_above], "white")
         draw.text((line, line), clock, _BLACK, self._large, anchor="lt")
-        texts = self._texts(number)
-        if from_above(self._case) or self._width > 2 * self._height:
+        is_wide = self._width > 2 * self._height and not from_the_side(self._case)
+        if from_above(self._case) or is_wide:
             # Below the time the texts would be over the beads.
             left = 2 * line + self._large.getlength(clock)
-            draw.text((left, 1.2 * line), ", ".join(texts), _DARK_GREY, self._small, anchor="lt")
+            texts = ", ".join(self._texts(number))
+            draw.text((left, 1.2 * line), texts, _DARK_GREY, self._small, anchor="lt")
         else:
-            for row, text in enumerate(texts):
+            for row, text in enumerate(self._rows(number)):
                 place = (line, (2.8 + 1.5 * row) * line)
                 draw.text(place, text, _DARK_GREY, self._small, anchor="lt")
-        drive = drive_text(self._case)
-        draw.text((line, self._height - line), drive, _DARK_GREY, self._small, anchor="ls")
+        left = line + self._draw_drive(draw)
+        bottom = self._height - line
+        drive = drive_description(self._case)
+        draw.text((left, bottom), drive, _DARK_GREY, self._small, anchor="ls")
+
+    def _draw_drive(self, draw: ImageDraw) -> float:
+        """Draw an arrow for each direction of the drive; return the width that they need."""
+        line = self._line
+        directions = seen_directions(self._case, self._scene.axes)
+        if not directions:
+            return 0.0
+        middle = np.array([1.8 * line, self._height - 1.4 * line])
+        for direction in directions:
+            half = 0.9 * line * direction * [1.0, -1.0]  # pixels are counted downward
+            self._draw_arrow(draw, middle, middle + half)
+            self._draw_arrow(draw, middle, middle - half)
+        return 2.4 * line
+
+    def _draw_arrow(self, draw: ImageDraw, tail: FloatArray, tip: FloatArray) -> None:
+        """Draw an arrow of the drive from its tail to its tip (pixels)."""
+        along = (tip - tail) / np.linalg.norm(tip - tail)
+        across = np.array([-along[1], along[0]])
+        neck = tip - 0.5 * self._line * along
+        side = 0.28 * self._line * across
+        shaft = np.concatenate([tail, neck])
+        head = np.concatenate([neck + side, neck - side, tip])
+        draw.line(shaft.tolist(), DRIVE_COLOUR, self._stroke)
+        draw.polygon(head.tolist(), DRIVE_COLOUR)
 
     def _draw_gravity(self, draw: ImageDraw) -> None:
         """Draw an arrow that points down, with its name."""
@@ -370,7 +483,9 @@ def speed_text(slowdown: float) -> str:
     return f"{1.0 / slowdown:.4g} × faster"
 
 
-def _write_mp4(path: Path, film: _Film, options: FilmOptions, on_progress: Tell | None) -> None:
+def _write_mp4(
+    path: Path, film: _Film, size: tuple[int, int], fps: int, on_progress: Tell | None
+) -> None:
     """Write H.264 with ffmpeg, and count the pictures: ffmpeg does not report a full disk."""
     from imageio_ffmpeg import count_frames_and_secs, write_frames
 
@@ -378,8 +493,8 @@ def _write_mp4(path: Path, film: _Film, options: FilmOptions, on_progress: Tell 
     # the time of ffmpeg's own, for files that are larger by a tenth.
     writer = write_frames(
         path,
-        options.size,
-        fps=options.fps,
+        size,
+        fps=fps,
         codec="libx264",
         quality=_MP4_QUALITY,
         macro_block_size=2,

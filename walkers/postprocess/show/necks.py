@@ -1,17 +1,16 @@
 """Liquid necks: the shapes of bridges in pictures, films and the three-dimensional view.
 
-A neck is as wide as the liquid of its bridge fills it. With the parabolic profile of the gap
-h(r) = s + r²/2R between two spheres, R = R₁R₂/(R₁ + R₂), or between a sphere and a plane, R = R₁,
-and a straight meniscus of radius b, its volume is V = πb²s + πb⁴/4R, hence
-b² = 2R (√(s² + V/πR) − s). Necks of longer gaps are thinner. V is the volume of the bridges of the
-case (`walkers.physics.capillary.bridge_volume`). Forces do not depend on these shapes.
+The surface of a neck is a surface of revolution whose meridian is an arc of a circle: the toroidal
+approximation of a meniscus. The arc meets the beads, or the bead and the wall, at the contact angle
+of the case, and its radius is the one with which the liquid inside has the volume of the bridge
+(`walkers.physics.capillary.bridge_volume`). Forces do not depend on these shapes.
 
-Y. I. Rabinovich, M. S. Esayanur, B. M. Moudgil, Langmuir 21 (2005) 10992–10997,
-doi 10.1021/la0517639 (volume).
+W. B. Haines, J. Agric. Sci. 15 (1925) 529–535, doi 10.1017/S0021859600082460 (toroid).
 """
 
 from __future__ import annotations
 
+from math import cos, pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,12 +29,14 @@ NECK_LEGEND = "blue: liquid bridges"
 """What the colour of necks means."""
 NO_BRIDGES: IntArray = np.empty((0, 3), dtype=np.int64)
 """Contacts of a frame without bridges."""
-_END_WIDTH = 1.12
-"""Width of a curved meniscus at its ends over that of the straight one."""
-_WAIST_WIDTH = 0.92
-"""Width of a curved meniscus in its middle over that of the straight one."""
 _LARGEST_WIDTH = 0.9
-"""Largest width of a neck over that of the smaller bead."""
+"""Largest radius of a neck where it meets a bead, over the radius of the bead."""
+_BISECTIONS = 24
+"""Number of steps in which the radius of the arc of a neck is found."""
+_POINTS_OF_VOLUME = 17
+"""Points of the arc with which the volume of a neck is computed."""
+_ABOVE = 1.001
+"""Distance of the sides of drawn rings from the axis, over that of the surface of the neck."""
 
 
 class Ends(NamedTuple):
@@ -181,47 +182,200 @@ def neck_surfaces(
     points : ndarray, shape (K, rings × sides, 3)
         Points of the surfaces, mm.
     normals : ndarray, shape (K, rings × sides, 3)
-        Unit vectors across the axes of the necks, to the outside.
+        Unit vectors normal to the surfaces, out of the liquid.
     """
     radius = motion.radius[contacts[:, 0]]
     second_radius = np.where(contacts[:, 1] < 0, np.inf, motion.radius[contacts[:, 1]])
-    radius_beyond = np.where(np.isfinite(second_radius), second_radius, 0.0)
     length = np.linalg.norm(ends.second - ends.first, axis=1)
-    gap = np.maximum(length - radius - radius_beyond, 0.0)
-    neck_radius = _neck_radius(motion, radius, second_radius, gap)
-    widest = _LARGEST_WIDTH * np.minimum(radius, second_radius)
-    end_radius = share * np.minimum(_END_WIDTH * neck_radius, widest)
-
-    # Heights are distances from the centre of the first bead along the axis.
-    low = np.sqrt(radius**2 - end_radius**2)
-    depth = np.where(np.isfinite(second_radius), radius_beyond**2 - end_radius**2, 0.0)
-    high = length - np.sqrt(depth)
-    step = np.linspace(-1.0, 1.0, grid.rings)
-    height = (low + high)[:, None] / 2.0 + (high - low)[:, None] / 2.0 * step
-    profile = _WAIST_WIDTH + (_END_WIDTH - _WAIST_WIDTH) * step**2
-    ring_radius = end_radius[:, None] * profile / _END_WIDTH
+    pairs = _Pairs.touching(radius, second_radius, length, motion.case.liquid.contact_angle)
+    arcs = _arcs_of_volume(pairs, _volumes(motion, radius, second_radius))
+    height, ring_radius, slope = arcs.points(pairs, grid.rings)
+    ring_radius = np.asarray(share)[..., None] * ring_radius
 
     axis = (ends.second - ends.first) / length[:, None]
     outward = _across(axis, grid.sides)[:, None]
-    points = ends.first[:, None, None] + height[..., None, None] * axis[:, None, None]
+    along = axis[:, None, None]
+    points = ends.first[:, None, None] + height[..., None, None] * along
     points = points + ring_radius[..., None, None] * outward
-    normals = np.broadcast_to(outward, points.shape)
+    normals = np.cos(slope)[..., None, None] * outward + np.sin(slope)[..., None, None] * along
     shape = (len(contacts), grid.rings * grid.sides, 3)
     return 1e3 * points.reshape(shape), normals.reshape(shape)
 
 
-def _neck_radius(
-    motion: Motion, radius: FloatArray, second_radius: FloatArray, gap: FloatArray
-) -> FloatArray:
-    """Radius b of straight necks (see the module), m; a wall has an infinite ``second_radius``."""
+def drawn_share(grid: NeckGrid) -> float:
+    """The width of necks to draw, over theirs, so that they do not cut into the facets of beads.
+
+    The middles of the sides of a ring are then outside of the bead as its corners are.
+    """
+    return _ABOVE / cos(pi / grid.sides)
+
+
+def _volumes(motion: Motion, radius: FloatArray, second_radius: FloatArray) -> FloatArray:
+    """Volumes of K bridges, m³; a wall has an infinite ``second_radius``."""
     liquid = motion.case.liquid.of_bridges
-    volume_of = np.vectorize(bridge_volume, [float], excluded=[2])
-    volume = volume_of(radius, second_radius, liquid)
-    reduced = 1.0 / (1.0 / radius + 1.0 / second_radius)
-    neck_radius: FloatArray = np.sqrt(
-        2.0 * reduced * (np.hypot(gap, np.sqrt(volume / (np.pi * reduced))) - gap)
+    different, number = np.unique(
+        np.stack([radius, second_radius], axis=1), axis=0, return_inverse=True
     )
-    return neck_radius
+    volumes = [bridge_volume(first, second, liquid) for first, second in different.tolist()]
+    return np.array(volumes)[number.ravel()]
+
+
+class _Pairs(NamedTuple):
+    """K pairs of surfaces with a neck: bead and bead, or bead and wall.
+
+    Attributes
+    ----------
+    radius : ndarray, shape (K,)
+        Radii of the first beads, m.
+    second_radius : ndarray, shape (K,)
+        Radii of the second beads, m; infinite for walls.
+    length : ndarray, shape (K,)
+        Distances from the centre of the first bead to that of the second, or to the wall, m.
+        Surfaces that overlap are taken as touching.
+    contact_angle
+        Contact angle, rad.
+    """
+
+    radius: FloatArray
+    second_radius: FloatArray
+    length: FloatArray
+    contact_angle: float
+
+    @classmethod
+    def touching(
+        cls,
+        radius: FloatArray,
+        second_radius: FloatArray,
+        length: FloatArray,
+        contact_angle: float,
+    ) -> _Pairs:
+        """Pairs at these distances, at least as far apart as they touch."""
+        beyond = np.where(np.isfinite(second_radius), second_radius, 0.0)
+        return cls(radius, second_radius, np.maximum(length, radius + beyond), contact_angle)
+
+    @property
+    def gap(self) -> FloatArray:
+        """Gaps, m, shape (K,)."""
+        beyond = np.where(np.isfinite(self.second_radius), self.second_radius, 0.0)
+        return np.asarray(self.length - self.radius - beyond)
+
+
+class _Arcs(NamedTuple):
+    """The meridians of K necks: circles around points beside the axis, in m.
+
+    Heights are along the axis from the centre of the first bead.
+
+    Attributes
+    ----------
+    arc_radius : ndarray, shape (K,)
+        Radii of the circles.
+    height : ndarray, shape (K,)
+        Heights of their centres.
+    distance : ndarray, shape (K,)
+        Distances of their centres from the axis.
+    """
+
+    arc_radius: FloatArray
+    height: FloatArray
+    distance: FloatArray
+
+    @classmethod
+    def of_radius(cls, pairs: _Pairs, arc_radius: FloatArray) -> _Arcs:
+        """The circles of a radius (m, shape (K,)) that meet both surfaces at the contact angle."""
+        cosine = np.cos(pairs.contact_angle)
+        to_first = pairs.radius**2 + arc_radius**2 + 2.0 * pairs.radius * arc_radius * cosine
+        is_bead = np.isfinite(pairs.second_radius)
+        second = np.where(is_bead, pairs.second_radius, 0.0)
+        to_second = second**2 + arc_radius**2 + 2.0 * second * arc_radius * cosine
+        between_beads = (pairs.length**2 + to_first - to_second) / (2.0 * pairs.length)
+        height = np.where(is_bead, between_beads, pairs.length - arc_radius * cosine)
+        distance = np.sqrt(np.maximum(to_first - height**2, 0.0))
+        return cls(arc_radius, height, distance)
+
+    def ends(self, pairs: _Pairs) -> tuple[FloatArray, FloatArray]:
+        """Angles of the arcs where they begin and end, rad from the axis' normal, shape (K,) each.
+
+        The point of a circle at an angle a is at the height of its centre + ρ sin a, at the
+        distance of its centre − ρ cos a from the axis.
+        """
+        # Triangle of both centres and the point on the bead, whose angle there is π − θ.
+        to_first = np.hypot(self.height, self.distance)
+        first = _angle_in_triangle(self.arc_radius, to_first, pairs.radius)
+        low = first - np.arctan2(self.height, self.distance)
+        is_bead = np.isfinite(pairs.second_radius)
+        above = pairs.length - self.height
+        second_radius = np.where(is_bead, pairs.second_radius, 1.0)
+        to_second = np.where(is_bead, np.hypot(above, self.distance), 1.0)
+        second = _angle_in_triangle(self.arc_radius, to_second, second_radius)
+        high_at_bead = np.arctan2(above, self.distance) - second
+        high_at_wall = np.arcsin(np.clip(above / self.arc_radius, -1.0, 1.0))
+        return low, np.where(is_bead, high_at_bead, high_at_wall)
+
+    def points(self, pairs: _Pairs, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Points of the arcs, evenly spaced from one end to the other.
+
+        Returns
+        -------
+        height, distance : ndarray, shape (K, count)
+            Heights, and distances from the axis, m.
+        slope : ndarray, shape (K, count)
+            Angle of the normal out of the liquid from the direction away from the axis, rad,
+            positive toward the second surface.
+        """
+        low, high = self.ends(pairs)
+        share = np.linspace(0.0, 1.0, count)
+        angle = low[:, None] + (high - low)[:, None] * share
+        height = self.height[:, None] + self.arc_radius[:, None] * np.sin(angle)
+        distance = self.distance[:, None] - self.arc_radius[:, None] * np.cos(angle)
+        return height, np.maximum(distance, 0.0), -angle
+
+    def volume(self, pairs: _Pairs) -> FloatArray:
+        """Volumes inside of the arcs and outside of the beads, m³, shape (K,)."""
+        height, distance, _ = self.points(pairs, _POINTS_OF_VOLUME)
+        inside = np.pi * np.trapezoid(distance**2, height, axis=1)
+        first_cap = _cap(pairs.radius, height[:, 0])
+        to_second = pairs.length - height[:, -1]
+        is_bead = np.isfinite(pairs.second_radius)
+        second_cap = _cap(np.where(is_bead, pairs.second_radius, to_second), to_second)
+        return np.asarray(inside - first_cap - second_cap)
+
+
+def _angle_in_triangle(beside: FloatArray, also_beside: FloatArray, opposite: FloatArray) -> Any:
+    """The angle between two sides of triangles, rad, from the lengths of all three."""
+    cosine = (beside**2 + also_beside**2 - opposite**2) / (2.0 * beside * also_beside)
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+
+def _cap(radius: FloatArray, distance: FloatArray) -> FloatArray:
+    """Volumes of the caps of balls beyond planes at distances from their centres, m³."""
+    height = radius - distance
+    return np.asarray(np.pi * height**2 * (radius - height / 3.0))
+
+
+def _arcs_of_volume(pairs: _Pairs, volume: FloatArray) -> _Arcs:
+    """The arcs of necks with volumes (m³, shape (K,)).
+
+    A neck that would be wider than `_LARGEST_WIDTH` has this width; one that is too long for its
+    volume is as thin as an arc can be.
+    """
+    # The volume rises with the radius of the arc, from a waist without width on.
+    is_bead = np.isfinite(pairs.second_radius)
+    second_radius = np.where(is_bead, pairs.second_radius, 0.0)
+    smallest = np.minimum(pairs.radius, pairs.second_radius)
+    low = np.maximum(pairs.gap / 2.0, 1e-6 * smallest)
+    high = low + 4.0 * smallest
+    for _ in range(_BISECTIONS):
+        middle = (low + high) / 2.0
+        arcs = _Arcs.of_radius(pairs, middle)
+        _, distance, _ = arcs.points(pairs, 2)
+        is_wide = distance[:, 0] > _LARGEST_WIDTH * pairs.radius
+        # On a wall, a neck that is as wide as its bead would be seen around the bead.
+        is_wide |= distance[:, 1] > np.where(is_bead, _LARGEST_WIDTH * second_radius, pairs.radius)
+        is_larger = is_wide | (arcs.volume(pairs) > volume)
+        is_larger &= arcs.distance > middle  # otherwise it has no waist
+        high = np.where(is_larger, middle, high)
+        low = np.where(is_larger, low, middle)
+    return _Arcs.of_radius(pairs, (low + high) / 2.0)
 
 
 def _across(axis: FloatArray, count: int) -> FloatArray:

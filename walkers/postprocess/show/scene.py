@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import ceil
+from math import ceil, radians, tan
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from walkers.arrays import BoolArray, FloatArray
 from walkers.errors import input_error
 from walkers.postprocess.measure import piles
 from walkers.postprocess.measure.motion import Motion
+from walkers.postprocess.show.camera import CAMERA_DISTANCE
+from walkers.postprocess.show.meshes import walls_of
 
 RUBY = (0xB0203C, 0xE0566C)
 """Colours of large and small highlighted beads: red, green, blue."""
@@ -149,8 +151,24 @@ def rotations_at(orientations: FloatArray, frame: float) -> FloatArray:
 
 
 @dataclass(frozen=True)
+class FloorGrid:
+    """Lines on an open floor along x and y.
+
+    Attributes
+    ----------
+    step
+        Distance of the lines, mm.
+    origin
+        x and y of a crossing, mm.
+    """
+
+    step: float
+    origin: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
 class Scene:
-    """Beads, walls and an orthographic view of them.
+    """Beads, walls and a view of them, orthographic or in perspective.
 
     Attributes
     ----------
@@ -170,6 +188,11 @@ class Scene:
         Displacement of the camera in each frame, mm; None for a camera at rest.
     has_tables
         Whether the run has been measured, so that its tables tell which clusters climb.
+    grid
+        Lines on an open floor; None: at round places.
+    angle_of_view
+        Angle of view of a perspective, degrees; 0: the view is orthographic. The limits are those
+        at the front of what is shown, the nearest to the camera.
     """
 
     motion: Motion
@@ -180,6 +203,8 @@ class Scene:
     rolling: bool = False
     camera_path: FloatArray | None = None
     has_tables: bool = True
+    grid: FloorGrid | None = None
+    angle_of_view: float = 0.0
 
     @classmethod
     def around(
@@ -212,7 +237,8 @@ class Scene:
         low, high = _limits(position, motion.radius, axes)
         boundary = motion.case.boundary
         if boundary.closed:
-            is_from_above = axes[2, 2] > 0.5  # the camera is more than 30° above the floor
+            # The camera is more than 30° above the floor, as that of trays.
+            is_from_above = axes[2, 2] > 0.5
             half = 5e2 * boundary.inner_width * np.array([1.0, is_from_above])
             low[:2] = np.minimum(low[:2], -half)
             high[:2] = np.maximum(high[:2], half)
@@ -271,6 +297,39 @@ class Scene:
         after = self.camera_path[number + ceil(fraction)]
         displacement: FloatArray = (1.0 - fraction) * before + fraction * after
         return displacement
+
+    def with_walls(self, frames: slice = slice(None)) -> Scene:
+        """The same view, which also includes the walls of a container up to the highest bead.
+
+        Parameters
+        ----------
+        frames
+            Frames in which all beads are below the upper end of the view.
+        """
+        corners = 1e3 * np.concatenate(walls_of(self.motion))
+        tops = self.motion.position[frames, :, 2] + self.motion.radius
+        corners[:, 2] = np.minimum(corners[:, 2], 1e3 * float(tops.max()))
+        seen = corners @ self.axes.T
+        low = np.minimum(self.low, seen.min(axis=0))
+        high = np.maximum(self.high, seen.max(axis=0))
+        return replace(self, low=low, high=high)
+
+    @property
+    def shortening(self) -> float:
+        """Size in the middle of the view over that at its front; 1 if it is orthographic."""
+        if not self.angle_of_view:
+            return 1.0
+        height = float(self.high[1] - self.low[1])
+        half_depth = float(self.high[2] - self.low[2]) / 2.0
+        distance = self.camera_distance(height)
+        return (distance - half_depth) / distance
+
+    def camera_distance(self, height: float) -> float:
+        """Distance of the camera from the middle of a view of a height, mm."""
+        if not self.angle_of_view:
+            return CAMERA_DISTANCE * height
+        half_depth = float(self.high[2] - self.low[2]) / 2.0
+        return half_depth + height / 2.0 / tan(radians(self.angle_of_view / 2.0))
 
     def height(self, aspect: float) -> float:
         """Height of the picture, mm, for a ratio of width to height."""

@@ -1,7 +1,8 @@
 """Pictures of a run at several times, drawn side by side as one figure.
 
-Containers are seen from the side, planes and trays along their normal; on a tilted plane, up in the
-picture is uphill. The view follows a walker that walks far. Films are made in
+Containers are seen from the side in perspective, planes and trays along their normal; on a tilted
+plane, up in the picture is uphill. The view follows a walker that walks far. An arrow with two
+heads shows the direction of the drive. Films are made in
 `walkers.postprocess.show.films`.
 """
 
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
 from textwrap import wrap
@@ -19,8 +20,15 @@ import numpy as np
 
 from walkers.arrays import FloatArray
 from walkers.errors import check_limits
+from walkers.postprocess.measure.caption import drive_description
 from walkers.postprocess.measure.motion import Motion, read_motion
-from walkers.postprocess.show.camera import from_the_side, named_direction, plan_axes
+from walkers.postprocess.show.camera import (
+    ANGLE_OF_VIEW,
+    from_the_side,
+    named_direction,
+    oblique_axes,
+    plan_axes,
+)
 from walkers.postprocess.show.drawing import (
     check_place,
     new_figure,
@@ -28,6 +36,8 @@ from walkers.postprocess.show.drawing import (
     save_figure,
     styled,
 )
+from walkers.postprocess.show.marks import draw_drive, draw_scale_bar, seen_directions
+from walkers.postprocess.show.meshes import round_below
 from walkers.postprocess.show.necks import NECK_LEGEND, bridges_at
 from walkers.postprocess.show.scene import Scene, gathered, motion_in_view
 from walkers.postprocess.show.window import Window
@@ -74,6 +84,16 @@ _LETTERS_PER_INCH = 13.0
 """Letters of the heading per inch of the width of the figure."""
 _FIGURE_MARGIN = 0.15
 """Space around the finished figure, inches, both sides together."""
+
+# --- marks ---
+_MARK_MARGIN = 0.05
+"""Distance of marks from the edges of a view, over its smaller side."""
+_HALF_ARROW = 0.12
+"""Half of the length of the arrow of the drive, over the smaller side of the view."""
+_LABEL_SIZE = 9.0
+"""Size of the text of a scale bar, points."""
+_LARGEST_BAR = 0.4
+"""Largest length of a scale bar over the width of the view."""
 
 # --- the view ---
 _EXTENT_FROM_ABOVE = 1.1
@@ -265,49 +285,61 @@ def _series_figure(motion: Motion, frames: Sequence[int], *, follow: bool) -> Fi
 
 def _scene_of(motion: Motion, *, follow: bool) -> Scene:
     """The view of a series: from the side with z up, or along the normal of the floor."""
+    driven = slice(motion.first_driven, None)
     if from_the_side(motion.case):
-        axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+        scene = Scene.around(motion, oblique_axes(motion), 1.0, driven, shaken=False)
+        scene = replace(scene.with_walls(driven), angle_of_view=ANGLE_OF_VIEW)
         extent_factor = 1.0
     else:
         axes = plan_axes(motion, np.array([1.0, 0.0, 0.0]))
         extent_factor = _EXTENT_FROM_ABOVE
-    driven = slice(motion.first_driven, None)
-    scene = Scene.around(motion, axes, extent_factor, driven, shaken=False)
+        scene = Scene.around(motion, axes, extent_factor, driven, shaken=False)
     if follow:
         scene = scene.following(_LARGEST_ASPECT, extent_factor, driven)
     return scene
 
 
 def _largest_layout(count: int, width: float, height: float) -> _Layout:
-    """The number of columns with which views (width and height in mm) are largest."""
+    """The number of columns with which views (width and height in mm) are largest.
+
+    A row that is not full counts as if the views were smaller.
+    """
     layouts = [_Layout(count, columns, width, height) for columns in range(1, count + 1)]
-    return max(layouts, key=lambda layout: (layout.scale, layout.columns))
+
+    def priority(layout: _Layout) -> tuple[float, int]:
+        places = layout.rows * layout.columns
+        return layout.scale * count / places, layout.columns
+
+    return max(layouts, key=priority)
 
 
 def _labels_of(scene: Scene, frames: Sequence[int]) -> _Labels:
     """Texts of the views of frames; if the view follows the beads, with their displacement."""
     case = scene.motion.case
-    heading = [case.title or case.name]
-    if case.boundary.tilted:
-        heading.append(case.boundary.tilted)
     titles = even_labels(scene.motion.time[frames])
-    if scene.camera_path is None:
-        x, y = _axis_labels(scene.motion)
-    else:
-        x = y = "(mm)"
+    x, y = _axis_labels(scene)
+    remarks = []
+    if case.boundary.tilted:
+        remarks.append(case.boundary.tilted)
+    if scene.camera_path is not None:
         toward, direction = named_direction(scene.motion)
-        heading.append(f"the view follows the beads: time and displacement {direction}")
+        remarks.append(f"the view follows the beads, displacement {direction} below the time")
         for number, frame in enumerate(frames):
             titles[number] += f"\n{scene.camera_displacement(frame) @ toward:z.1f} mm"
-    heading.append(", ".join([*scene.colour_legend, NECK_LEGEND]))
-    return _Labels(heading, titles, x, y)
+    remarks += [*scene.colour_legend, NECK_LEGEND]
+    if seen_directions(case, scene.axes):
+        remarks.append(f"arrow: {drive_description(case)}")
+    return _Labels([case.title or case.name, ", ".join(remarks)], titles, x, y)
 
 
-def _axis_labels(motion: Motion) -> tuple[str, str]:
-    """Labels of the axes of a view that is at rest."""
-    if from_the_side(motion.case):
-        return "x (mm)", "height (mm)"
-    if motion.case.boundary.tilted:
+def _axis_labels(scene: Scene) -> tuple[str, str]:
+    """Labels of the axes of a view that is at rest; empty for a view without axes.
+
+    In perspective, and in a view that follows the beads, a scale bar tells lengths.
+    """
+    if scene.angle_of_view or scene.camera_path is not None:
+        return "", ""
+    if scene.motion.case.boundary.tilted:
         return "across the slope (mm)", "uphill (mm)"
     return "x (mm)", "y (mm)"
 
@@ -324,22 +356,48 @@ def _draw(scene: Scene, frames: Sequence[int], labels: _Labels, layout: _Layout)
     figure.suptitle("\n".join(heading), fontsize=10)
     extent = np.stack([scene.low, scene.high], axis=1)[:2].ravel().tolist()
     bridges = bridges_at(scene.motion, frames)
-    with closing(Window(scene, layout.view_pixels)) as window:
+    with closing(Window(scene, layout.view_pixels, occlusion=bool(scene.angle_of_view))) as window:
         for number, frame in enumerate(frames):
             panel = panels.flat[number]
             picture = window.picture(frame, bridges[number])
             panel.imshow(picture, extent=extent, interpolation="antialiased")
             panel.set_title(labels.titles[number], fontsize=10)
-            panel.spines["right"].set_visible(from_the_side(scene.motion.case))  # a wall
-            left_label = labels.y if layout.is_left(number) else None
-            lower_label = labels.x if layout.is_lowest(number) else None
-            _draw_scales(panel, left_label, lower_label)
+            if labels.x:
+                left_label = labels.y if layout.is_left(number) else None
+                lower_label = labels.x if layout.is_lowest(number) else None
+                _draw_scales(panel, left_label, lower_label)
+            else:
+                panel.set_axis_off()
+    _draw_marks(panels.flat[0], scene, has_bar=not labels.x)
     for panel in panels.flat[len(frames) :]:
         panel.remove()
     figure.draw_without_rendering()
     box = figure.get_tightbbox()
     figure.set_size_inches(box.width + _FIGURE_MARGIN, box.height + _FIGURE_MARGIN)
     return figure
+
+
+def _draw_marks(panel: Axes, scene: Scene, *, has_bar: bool) -> None:
+    """Draw the directions of the drive, and a scale bar, at the edges of the first view.
+
+    In perspective, the bar has its length in the middle of the view.
+    """
+    low = scene.low[:2]
+    high = scene.high[:2]
+    extent = high - low
+    margin = _MARK_MARGIN * float(extent.min())
+    half_length = _HALF_ARROW * float(extent.min())
+    directions = seen_directions(scene.motion.case, scene.axes)
+    if directions:
+        reach = half_length * np.abs(directions).max(axis=0)
+        middle = np.array([low[0] + margin + reach[0], high[1] - margin - reach[1]])
+        draw_drive(panel, directions, middle, half_length)
+    if not has_bar:
+        return
+    length = round_below(_LARGEST_BAR * float(extent[0]))
+    drawn = length * scene.shortening
+    place = (float(high[0]) - margin, float(low[1]) + margin)
+    draw_scale_bar(panel, place, drawn, f"{length:g} mm", _LABEL_SIZE)
 
 
 def _draw_scales(panel: Axes, left_label: str | None, lower_label: str | None) -> None:

@@ -34,6 +34,12 @@ from walkers.postprocess.show.drawing import (
     save_figure,
     styled,
 )
+from walkers.postprocess.show.marks import (
+    DRIVE_COLOUR,
+    draw_drive,
+    draw_scale_bar,
+    drive_directions,
+)
 from walkers.postprocess.show.meshes import round_below, walls_of
 from walkers.postprocess.show.scene import Scene, motion_in_view
 from walkers.postprocess.show.window import Window
@@ -71,8 +77,6 @@ _LEAST_WIDTH = 4.0
 """Smallest width of the figure, inches, for the heading."""
 _TEXT: Mapping[str, Any] = {"fontsize": 9, "ha": "center", "va": "center"}
 """The look of names in the picture."""
-_DRIVE_COLOUR = "#b0203c"
-"""Colour of the arrows of the drive."""
 _FRONT_COLOUR = "#8c9aa5"
 """Colour of the names of walls in front, which are not drawn."""
 
@@ -249,7 +253,7 @@ def _figure(motion: Motion, heading: Sequence[str]) -> Figure:
     figure.suptitle("\n".join(lines), fontsize=10)
     panel = figure.subplots()
     size = (round(_PIXELS_PER_INCH * scale * width), round(_PIXELS_PER_INCH * scale * height))
-    with closing(Window(scene, size)) as window:
+    with closing(Window(scene, size, occlusion=motion.case.loose)) as window:
         picture = window.picture(0)
     left, bottom, _ = scene.low.tolist()
     right, top, _ = scene.high.tolist()
@@ -296,43 +300,25 @@ def gravity_direction(case: Case) -> FloatArray:
     return np.asarray(gravity / strength if strength else gravity)
 
 
-def drive_directions(case: Case) -> list[FloatArray]:
-    """Unit vectors of the different directions in which the drive shakes the boundary."""
-    drive = case.excitation
-    if drive.record is not None:
-        return [np.array(AXES[axis]) for axis in drive.record.axes]
-    directions: list[FloatArray] = []
-    for harmonic in drive.harmonics:
-        direction = np.array(harmonic.direction)
-        cosines = np.abs(np.array([*directions, np.zeros(3)]) @ direction)
-        if harmonic.amplitude and cosines.max() < 1.0 - 1e-9:
-            directions.append(direction)
-    return directions
-
-
 def _draw_drive(panel: Axes, scene: Scene) -> None:
     """Draw an arrow with two heads for each direction of the drive, below the beads."""
     extent = (scene.high - scene.low)[:2].max()
     middle = np.array([(scene.low[0] + scene.high[0]) / 2.0, scene.low[1] + 1.3 * _ARROW * extent])
-    directions = drive_directions(scene.motion.case)
+    directions = [(scene.axes @ axis)[:2] for axis in drive_directions(scene.motion.case)]
+    draw_drive(panel, directions, middle, _ARROW * extent)
     lowest = 0.0
-    for direction in directions:
-        half = _ARROW * extent * (scene.axes @ direction)[:2]
-        style = {"arrowstyle": "<|-|>", "color": _DRIVE_COLOUR, "linewidth": 2.0}
-        panel.annotate("", middle + half, middle - half, arrowprops=style)
-        lowest = max(lowest, abs(half[1]))
+    for _, up in directions:
+        lowest = max(lowest, abs(_ARROW * extent * up))
     text = "drive" if directions else "no drive"
     x, y = middle - [0.0, lowest + 0.25 * _ARROW * extent]
-    panel.text(x, y, text, color=_DRIVE_COLOUR, **_TEXT)
+    panel.text(x, y, text, color=DRIVE_COLOUR, **_TEXT)
 
 
 def _draw_scale(panel: Axes, scene: Scene) -> None:
     """Draw a scale of a round length at the lower right."""
     extent = (scene.high - scene.low)[:2].max()
     width = scene.high[0] - scene.low[0]
-    length = round_below(0.25 * width)
     right = scene.high[0] - 0.3 * _ARROW * extent
     level = scene.low[1] + 0.6 * _ARROW * extent
-    panel.plot([right - length, right], [level, level], color="black", linewidth=2.0)
-    text = f"{length:g} mm"
-    panel.text(right - length / 2.0, level, f"{text}\n", **_TEXT)
+    length = round_below(0.25 * width)
+    draw_scale_bar(panel, (right, level), length, f"{length:g} mm", _TEXT["fontsize"])

@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from walkers.arrays import FloatArray, IntArray
 from walkers.postprocess.measure.motion import interpolated_positions, visible_displacement
-from walkers.postprocess.show.camera import CAMERA_DISTANCE
 from walkers.postprocess.show.meshes import beach_ball, floor_lines, mesh_of, round_below, walls_of
 from walkers.postprocess.show.necks import (
     NECK_COLOUR,
@@ -21,11 +20,12 @@ from walkers.postprocess.show.necks import (
     NeckGrid,
     at_front_walls,
     bridge_ends,
+    drawn_share,
     neck_surfaces,
     neck_triangles,
 )
 from walkers.postprocess.show.offscreen import prepare_drawing
-from walkers.postprocess.show.scene import Scene, rotations_at
+from walkers.postprocess.show.scene import FloorGrid, Scene, rotations_at
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -38,10 +38,24 @@ _LINES = "#bcc6cd"
 """Colour of lines on floors and walls."""
 _WALL = "#eef1f3"
 """Colour of walls."""
+_FLOOR = "#d3dade"
+"""Colour of the floor of a container in perspective."""
+_LEVEL = 1e-3
+"""Largest height of the corners of a floor over the larger side of the view."""
+_PANE = "#8fb3c9"
+"""Colour of walls in front of the beads."""
+_PANE_OPACITY = 0.07
+"""Opacity of these walls, from 0 to 1."""
 _EDGE = "#5a6670"
 """Colour of the edges of walls."""
 _SHADOW = 0.4
 """Opacity of a shadow below the centre of a bead."""
+_AMBIENT = 0.18
+"""Share of light from everywhere on beads, without which their lower halves would be black."""
+_OCCLUSION_REACH = 1.5
+"""Distance within which other beads keep light away, over the mean radius."""
+_OCCLUSION_BIAS = 0.03
+"""Distance that a surface does not shade itself, over this distance."""
 _SUPERSAMPLING = 1.5
 """Pixels that are drawn over those of the picture, in each direction."""
 _FLOOR_EXTENT = 6.0
@@ -74,8 +88,8 @@ class _Detail:
 
 
 _DETAILS = (
-    _Detail(10, 72, NeckGrid(9, 36)),
-    _Detail(100, 30, NeckGrid(7, 24)),
+    _Detail(10, 96, NeckGrid(13, 72)),
+    _Detail(100, 36, NeckGrid(7, 30)),
     _Detail(500, 18, NeckGrid(5, 12)),
     _Detail(np.inf, 12, NeckGrid(3, 8)),
 )
@@ -91,6 +105,9 @@ class Window:
         The scene.
     size
         Width and height of pictures in pixels.
+    occlusion
+        Whether places between beads that little light reaches are darker. A picture then takes some
+        five times as long.
 
     Attributes
     ----------
@@ -103,7 +120,7 @@ class Window:
         If this machine cannot draw without a screen.
     """
 
-    def __init__(self, scene: Scene, size: Sequence[int]) -> None:
+    def __init__(self, scene: Scene, size: Sequence[int], *, occlusion: bool = False) -> None:
         prepare_drawing()
         import pyvista as pv
 
@@ -123,10 +140,13 @@ class Window:
         height_mm = scene.height(width / height)
         extent_mm = max(height_mm, height_mm * width / height)
         self.pixels_per_mm = height / height_mm
-        self._camera_position, self._middle, up = scene.camera(CAMERA_DISTANCE * height_mm)
+        distance_mm = scene.camera_distance(height_mm)
+        self._camera_position, self._middle, up = scene.camera(distance_mm)
         self._plotter.camera_position = [self._camera_position, self._middle, up]
-        self._plotter.camera.parallel_projection = True
+        self._plotter.camera.parallel_projection = not scene.angle_of_view
         self._plotter.camera.parallel_scale = height_mm / 2.0
+        if scene.angle_of_view:
+            self._plotter.camera.view_angle = scene.angle_of_view
 
         # Without a floor there is nothing on which shadows could lie.
         self._shadows: _Copies | None = None
@@ -144,7 +164,14 @@ class Window:
         black = np.zeros((count, len(points), 3))  # until `picture` colours the beads
         self._beads = _Copies(self._plotter, points, triangles, 1e3 * scene.motion.radius, black)
         self._beads.reflection.specular = 0.4
+        self._beads.reflection.ambient = _AMBIENT
+        self._beads.reflection.diffuse = 1.0 - _AMBIENT / 2.0
         self._necks = self._add_necks()
+        if occlusion:
+            reach = _OCCLUSION_REACH * 1e3 * float(scene.motion.radius.mean())
+            self._plotter.enable_ssao(  # type: ignore[call-arg]
+                radius=reach, bias=_OCCLUSION_BIAS * reach, kernel_size=64, blur=True
+            )
 
     def picture(self, frame: float, bridges: IntArray = NO_BRIDGES) -> Picture:
         """Draw the scene at a frame or between two frames.
@@ -242,7 +269,8 @@ class Window:
         if not len(contacts):
             return
         visible_ends = Ends(ends.first[is_visible], ends.second[is_visible])
-        points, normals = neck_surfaces(motion, contacts, visible_ends, self._neck_grid)
+        share = drawn_share(self._neck_grid)
+        points, normals = neck_surfaces(motion, contacts, visible_ends, self._neck_grid, share)
         triangles = neck_triangles(len(contacts), self._neck_grid)
         # `neck_surfaces` gives mm, as the shift.
         necks = pv.PolyData.from_regular_faces(points.reshape(-1, 3) + shift, triangles)
@@ -294,12 +322,12 @@ class Window:
         if camera_path is None:
             camera_path = np.zeros((1, 3))
         half = _FLOOR_EXTENT * extent / 2.0
-        middle = self._middle * [1.0, 1.0, 0.0]
+        grid = self._scene.grid or FloorGrid(round_below(extent / _LINES_PER_EXTENT))
+        origin = np.array([*grid.origin, 0.0])
+        middle = self._middle * [1.0, 1.0, 0.0] - origin
         low = middle + camera_path.min(axis=0) - half
         high = middle + camera_path.max(axis=0) + half
-        lines = pv.line_segments_from_points(
-            floor_lines(low, high, round_below(extent / _LINES_PER_EXTENT))
-        )
+        lines = pv.line_segments_from_points(floor_lines(low, high, grid.step) + origin)
         # Slightly lower, so that lines do not cut through beads that overlap with the floor.
         lines.translate([0.0, 0.0, -1e-3 * extent], inplace=True)
         return [self._add_lines(lines, _LINES)]
@@ -312,6 +340,7 @@ class Window:
         """
         faces = [1e3 * corners for corners in walls_of(self._scene.motion)]
         walls = mesh_of(faces).clean(tolerance=1e-6, absolute=True)
+        level = [face for face in faces if np.ptp(face[:, 2]) < _LEVEL * extent]
         edges = walls.extract_feature_edges(
             feature_angle=30.0, manifold_edges=False, non_manifold_edges=False
         )
@@ -320,6 +349,18 @@ class Window:
             self._plotter.add_mesh(walls, color=_WALL, lighting=False, culling="back"),
             self._add_lines(edges, _EDGE),
         ]
+        if self._scene.angle_of_view:
+            # Of these panes, those in front of the beads are seen.
+            panes = self._plotter.add_mesh(
+                walls, color=_PANE, opacity=_PANE_OPACITY, lighting=False, culling="front"
+            )
+            actors.append(panes)
+            if level:
+                floor = mesh_of(level)
+                floor.translate(_LEVEL * extent * self._scene.axes[2], inplace=True)
+                actors.append(
+                    self._plotter.add_mesh(floor, color=_FLOOR, lighting=False, culling="back")
+                )
         if self._scene.camera_path is not None:
             path_axis = int(np.argmax(np.ptp(self._scene.camera_path, axis=0)))
             marks = self._marks(faces, path_axis, round_below(extent / _LINES_PER_EXTENT))

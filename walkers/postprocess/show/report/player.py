@@ -38,6 +38,7 @@ from walkers.postprocess.show.necks import (
     bridge_ends,
     bridges_at,
     bridges_text,
+    drawn_share,
     neck_surfaces,
     neck_triangles,
 )
@@ -64,7 +65,7 @@ _ASPECT = 1.5
 """Smallest ratio of width to height of the picture."""
 _MOST_LINES = 200.0
 """Largest number of lines on a floor."""
-_BALL_CELLS = 24
+_BALL_CELLS = 48
 """Cells around a ball, a multiple of six."""
 _LANE = 1.25
 """Distance of the lanes of independent walkers, in lengths of a walker."""
@@ -93,8 +94,8 @@ class _NeckDetail:
 
 
 _NECK_DETAILS = (
-    _NeckDetail(2000, NeckGrid(5, 16)),
-    _NeckDetail(10_000, NeckGrid(2, 12)),
+    _NeckDetail(2000, NeckGrid(5, 32)),
+    _NeckDetail(10_000, NeckGrid(3, 12)),
     _NeckDetail(np.inf, NeckGrid(2, 6)),
 )
 """From few necks to many."""
@@ -363,7 +364,7 @@ def _necks(
         drawn_contacts = np.flatnonzero(neighbours.any(axis=0))
         ends = bridge_ends(motion, position[frame], contacts[drawn_contacts])
         is_hidden = at_front_walls(motion, contacts[drawn_contacts], ends, toward)
-        width = (is_bridged[frame, drawn_contacts] & ~is_hidden).astype(float)
+        width = drawn_share(grid) * (is_bridged[frame, drawn_contacts] & ~is_hidden)
         necks, _ = neck_surfaces(motion, contacts[drawn_contacts], ends, grid, width)
         points[frame, drawn_contacts] = necks if path is None else necks - path[frame]
     course = _rounded(points.reshape(len(bridges), -1, 3))
@@ -372,7 +373,7 @@ def _necks(
         neck_triangles(len(contacts), grid).astype(np.uint32),
         color=NECK_COLOUR,
         opacity=NECK_OPACITY,
-        flat_shading=True,
+        flat_shading=False,
         name="bridges",
     )
     mesh.vertices = _series(motion, course)

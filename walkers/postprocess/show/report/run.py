@@ -12,6 +12,7 @@ from walkers.files import write_bytes
 from walkers.inputs.origins import Origin, text_of
 from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.caption import caption
+from walkers.postprocess.measure.in_words import motion_in_words
 from walkers.postprocess.measure.motion import Motion, read_motion
 from walkers.postprocess.measure.numbers import rows
 from walkers.postprocess.measure.results import (
@@ -19,6 +20,7 @@ from walkers.postprocess.measure.results import (
     Results,
     has_band,
     headlines,
+    main_parts,
     not_computed,
     read_results,
 )
@@ -89,6 +91,8 @@ def report_run(
         "name": directory.resolve().name,
         "title": motion.case.title or motion.case.name,
         "summary": f"{caption(motion.case)}.",
+        "main": main_parts(results),
+        "in_words": motion_in_words(results),
         "result": report_values(motion.case, results, origins),
         "manifest": read_manifest(directory) if is_finished(directory) else {},
         "figures": {name: svg_of(figure) for name, figure in drawn.items()},
