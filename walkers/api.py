@@ -976,7 +976,11 @@ class Sweep:
     directory
         The directory of the sweep.
     failures
-        The points that failed in the call of `sweep` that gave this object.
+        The points that failed in the call of `sweep` that gave this object, in order; empty for a
+        sweep of `load`, whose table has their ``status``. Each has the number of its ``point``, the
+        name of its ``run``, the ``reason`` (the name of a class such as ``BlowUp``), the
+        ``message`` and the ``directory`` of the unfinished run
+        (`walkers.sweeps.workers.Failure`).
     """
 
     directory: Path
