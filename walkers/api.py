@@ -1475,7 +1475,8 @@ def _side(named: Reference) -> ComparedRun:
     name = directory.name if directory and is_run else str(named.given)
     changes = [f"{key}={written(value)}" for key, value in named.changes.items()]
     draws = draws_of(directory) if directory else None
-    return ComparedRun(" ".join([name, *changes]), case, directory, draws)
+    origins = None if is_run else case.origins
+    return ComparedRun(" ".join([name, *changes]), case, directory, draws, origins)
 
 
 def climb(

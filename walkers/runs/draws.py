@@ -40,8 +40,10 @@ class Unknown:
         Both ends of its range in SI units.
     logarithmic
         Whether the range is log-uniform.
-    text, range_text
-        The value and the range as case files have them: ``0.2``, ``0.1 to 0.6``.
+    text
+        The value as case files have it: ``0.2``.
+    ends
+        Both ends of the range as case files have them: numbers, or texts such as ``29 um``.
     """
 
     value: float | str
@@ -49,7 +51,12 @@ class Unknown:
     high: float
     logarithmic: bool
     text: str = field(compare=False)
-    range_text: str = field(compare=False)
+    ends: tuple[float | str, float | str] = field(compare=False)
+
+    @property
+    def range_text(self) -> str:
+        """The range as text: ``0.1 to 0.6``."""
+        return " to ".join(map(str, self.ends))
 
 
 @dataclass(frozen=True)
@@ -125,6 +132,9 @@ class ComparedDraws:
     other_unknowns
         The other unknowns as sentences, such as ``contact.friction.bead_wall 0.1 to 0.6, and 0.2 to
         0.4``. If there are any, draws cannot be paired.
+    for_first, for_second
+        What each case must take over from the other for pairs, by the keys: the unknowns that it
+        lacks; the second case also those that it has with another value or range.
     """
 
     quantity: str
@@ -134,6 +144,8 @@ class ComparedDraws:
     independent: PairsOfDraws
     common_unknowns: Sequence[str]
     other_unknowns: Sequence[str]
+    for_first: Mapping[str, Unknown]
+    for_second: Mapping[str, Unknown]
 
 
 def compare_draws(first: Draws, second: Draws, quantity: str, unit: str) -> ComparedDraws | None:
@@ -175,7 +187,23 @@ def compare_draws(first: Draws, second: Draws, quantity: str, unit: str) -> Comp
         independent=_pairs(every_first, every_second, unit),
         common_unknowns=_common_unknowns(first.unknowns, second.unknowns),
         other_unknowns=other_unknowns,
+        for_first=_unknowns_of_one(second.unknowns, first.unknowns),
+        for_second=_different_unknowns(first.unknowns, second.unknowns),
     )
+
+
+def _unknowns_of_one(
+    these: Mapping[str, Unknown], others: Mapping[str, Unknown]
+) -> dict[str, Unknown]:
+    """The unknowns that the others lack."""
+    return {key: unknown for key, unknown in these.items() if key not in others}
+
+
+def _different_unknowns(
+    these: Mapping[str, Unknown], others: Mapping[str, Unknown]
+) -> dict[str, Unknown]:
+    """The unknowns that the others lack, or have with another value or range."""
+    return {key: unknown for key, unknown in these.items() if others.get(key) != unknown}
 
 
 def _common_unknowns(first: Mapping[str, Unknown], second: Mapping[str, Unknown]) -> list[str]:
