@@ -187,23 +187,21 @@ def compare_draws(first: Draws, second: Draws, quantity: str, unit: str) -> Comp
         independent=_pairs(every_first, every_second, unit),
         common_unknowns=_common_unknowns(first.unknowns, second.unknowns),
         other_unknowns=other_unknowns,
-        for_first=_unknowns_of_one(second.unknowns, first.unknowns),
-        for_second=_different_unknowns(first.unknowns, second.unknowns),
+        for_first=_lacking(first.unknowns, second.unknowns),
+        for_second=_different(second.unknowns, first.unknowns),
     )
 
 
-def _unknowns_of_one(
-    these: Mapping[str, Unknown], others: Mapping[str, Unknown]
-) -> dict[str, Unknown]:
-    """The unknowns that the others lack."""
-    return {key: unknown for key, unknown in these.items() if key not in others}
+def _lacking(case: Mapping[str, Unknown], other_case: Mapping[str, Unknown]) -> dict[str, Unknown]:
+    """The unknowns of the other case that a case lacks."""
+    return {key: unknown for key, unknown in other_case.items() if key not in case}
 
 
-def _different_unknowns(
-    these: Mapping[str, Unknown], others: Mapping[str, Unknown]
+def _different(
+    case: Mapping[str, Unknown], other_case: Mapping[str, Unknown]
 ) -> dict[str, Unknown]:
-    """The unknowns that the others lack, or have with another value or range."""
-    return {key: unknown for key, unknown in these.items() if others.get(key) != unknown}
+    """The unknowns of the other case that a case lacks, or has with another value or range."""
+    return {key: unknown for key, unknown in other_case.items() if case.get(key) != unknown}
 
 
 def _common_unknowns(first: Mapping[str, Unknown], second: Mapping[str, Unknown]) -> list[str]:
