@@ -24,6 +24,7 @@ from walkers.sweeps.table import cells_of, load_table
 
 FRICTION = "contact.friction.bead_wall"
 RESTITUTION = "contact.restitution"
+ROUGHNESS = "contact.roughness.bead_bead"
 RANGE = [0.05, 0.3]
 WIDER_RANGE = [0.05, 0.4]
 POINTS = 4
@@ -32,7 +33,7 @@ POINTS = 4
 def make_unknown(
     value: float = 0.2, low: float = 0.1, high: float = 0.6, *, logarithmic: bool = False
 ) -> Unknown:
-    return Unknown(value, low, high, logarithmic, text=f"{value}", range_text=f"{low} to {high}")
+    return Unknown(value, low, high, logarithmic, text=f"{value}", ends=(low, high))
 
 
 UNKNOWN = make_unknown()
@@ -141,6 +142,28 @@ def test_an_unknown_of_one_case_alone_leaves_no_pairs() -> None:
     assert comparison.common is None
     assert comparison.common_unknowns == [FRICTION]
     assert comparison.other_unknowns == [f"{RESTITUTION} in the first case alone"]
+    assert comparison.for_first == {}
+    assert comparison.for_second == {RESTITUTION: unknowns[RESTITUTION]}
+
+
+def test_ranges_to_take_over_are_printed_as_lines_of_a_case_file() -> None:
+    """Values and ranges of the first case for the second one, and what that has alone."""
+    unknowns = {
+        FRICTION: Unknown(0.3, 0.1, 0.6, False, "0.3", (0.1, 0.6)),
+        ROUGHNESS: Unknown(3e-8, 2e-8, 8e-8, True, "30 nm", ("20 nm", "80 nm")),
+    }
+    velocities = {"velocity": np.array([1.0, 2.0])}
+    second = Draws(unknowns, np.array([[0.1, 3e-8], [0.2, 4e-8]]), velocities)
+    printed = compared_draws_text(compared(FIRST, second), "a", "b")
+    lines = [
+        "for a:",
+        "  [uncertain]",
+        '  contact.roughness.bead_bead = { loguniform = ["20 nm", "80 nm"] } # around 30 nm',
+        "for b:",
+        "  [uncertain]",
+        "  contact.friction.bead_wall = [0.1, 0.6] # around 0.2",
+    ]
+    assert printed.endswith("\n".join(["", *lines]))
 
 
 def test_draws_of_no_equal_values_say_how_to_have_pairs() -> None:
@@ -229,6 +252,17 @@ def test_other_ranges_are_told_and_give_the_independent_band_alone(
     assert [line for line in lines if line.startswith("common ")] == []
     assert len([line for line in lines if line.startswith("independent  ")]) == 1
     assert f"{FRICTION} 0.05 to 0.3, and 0.05 to 0.4" in done.stdout
+
+
+def test_a_range_that_is_given_later_counts(
+    both_points: list[Path], copied_runs: Path, tmp_path: Path
+) -> None:
+    """The run of the case does not know the range of its file, which changes no number."""
+    (tmp_path / "wider.toml").write_text(to_toml(uncertain_case([0.05, 0.35])))
+    call("run", "wider.toml", "--spread", "--points", str(POINTS), check=True, folder=tmp_path)
+    first = copied_runs / both_points[0].name
+    done = call("compare", str(first), "wider.toml", check=True, folder=tmp_path)
+    assert f"{FRICTION} 0.05 to 0.3, and 0.05 to 0.35" in done.stdout
 
 
 def test_the_points_of_a_sweep_are_compared_with_the_first(

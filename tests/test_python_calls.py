@@ -17,9 +17,12 @@ import walkers
 from tests.conftest import SHORT, call, document, to_toml
 from walkers import Run, Sweep, load_case
 from walkers.cache import make_cache_folder
+from walkers.commands import ALL_COMMANDS, Command
 from walkers.inputs.sweep import load_sweep
 from walkers.postprocess.measure.motion import Group, Motion
 from walkers.runner import failures
+from walkers.sweeps.spread import Spread
+from walkers.sweeps.workers import Failure
 from walkers.warning import warn_user
 
 Call = Callable[[Run, Sweep], object]
@@ -274,7 +277,55 @@ def test_every_public_name_is_in_the_reference() -> None:
     assert documented == set(walkers.__all__)
 
 
-@pytest.mark.parametrize("kind", [Run, Motion, Group])
+CALLS = {
+    "new": "walkers.new(",
+    "show": "case.origins",
+    "run": "walkers.run(",
+    "sweep": "walkers.sweep(",
+    "log": "run.log()",
+    "plot": "run.plot()",
+    "render": "run.render()",
+    "report": "run.report()",
+    "compare": "walkers.compare(",
+    "climb": "walkers.climb(",
+    "export": "run.export(",
+    "calibrate": "walkers.calibrate(",
+}
+"""Calls in the table of the reference that do what a command does."""
+
+
+@pytest.mark.parametrize("command", ALL_COMMANDS, ids=lambda command: command.name)
+def test_the_reference_has_a_call_for_each_command(command: Command) -> None:
+    """Or says that there is none."""
+    page = (Path(__file__).parents[1] / "docs" / "reference" / "python.rst").read_text()
+    table, _, rest = page.partition("Only the program ")
+    without_call, _, _ = rest.partition("\nFunctions\n")
+    if command.name in CALLS:
+        assert CALLS[command.name] in table
+    else:
+        assert f"``walkers {command.name}``" in without_call
+
+
+def test_a_number_that_a_result_lacks_is_refused_with_a_suggestion(
+    run_directory: Callable[..., Path],
+) -> None:
+    result = walkers.load(run_directory(run=SHORT)).result
+    with pytest.raises(KeyError, match='no number velocty; did you mean "velocity"'):
+        result["velocty"]
+    assert result.get("velocty") is None
+    assert "velocty" not in result
+
+
+def test_every_attribute_of_a_result_is_described(run_directory: Callable[..., Path]) -> None:
+    result = walkers.load(run_directory(run=SHORT)).result
+    assert result.__doc__
+    for name in vars(result):
+        assert re.search(rf"^ +{name} :", result.__doc__, re.MULTILINE), name
+    for name in result.about:
+        assert f"``{name}``" in result.__doc__, name
+
+
+@pytest.mark.parametrize("kind", [Run, Sweep, Motion, Group, Spread, Failure])
 def test_every_attribute_is_described(kind: type) -> None:
     """By a line of the class, or by a docstring of its own."""
     public = [name for name in dir(kind) if not name.startswith("_")]

@@ -977,7 +977,11 @@ class Sweep:
     directory
         The directory of the sweep.
     failures
-        The points that failed in the call of `sweep` that gave this object.
+        The points that failed in the call of `sweep` that gave this object, in order; empty for a
+        sweep of `load`, whose table has their ``status``. Each has the number of its ``point``, the
+        name of its ``run``, the ``reason`` (the name of a class such as ``BlowUp``), the
+        ``message`` and the ``directory`` of the unfinished run
+        (`walkers.sweeps.workers.Failure`).
     """
 
     directory: Path
@@ -1472,7 +1476,8 @@ def _side(named: Reference) -> ComparedRun:
     name = directory.name if directory and is_run else str(named.given)
     changes = [f"{key}={written(value)}" for key, value in named.changes.items()]
     draws = draws_of(directory) if directory else None
-    return ComparedRun(" ".join([name, *changes]), case, directory, draws)
+    origins = None if is_run else case.origins
+    return ComparedRun(" ".join([name, *changes]), case, directory, draws, origins)
 
 
 def climb(

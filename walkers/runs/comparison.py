@@ -45,7 +45,8 @@ from walkers.terminal import fitted_lines, table_width
 from walkers.text import aligned_blocks, with_unit
 
 if TYPE_CHECKING:
-    from walkers.inputs.tables.case import Case
+    from walkers.inputs.origins import Origin
+from walkers.inputs.tables.case import Case
 
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
 """Numbers whose scatter is in the result."""
@@ -74,12 +75,16 @@ class ComparedRun:
         The directory of its finished run; None if there is none.
     draws
         The draws of the spread of the run; None if it has no spread.
+    origins
+        Sources of the values of the case that was asked for, whose ranges may be newer than those
+        of the run; None: the case of the run.
     """
 
     name: str
     case: Case
     directory: Path | None
     draws: Draws | None = None
+    origins: Sequence[Origin] | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -162,8 +167,8 @@ def compare_runs(first: ComparedRun, second: ComparedRun) -> Comparison:
     draws: ComparedDraws | None = None
     if first.directory and second.directory:
         runs = (
-            _FinishedRun(first.name, read_results(first.directory), first.draws),
-            _FinishedRun(second.name, read_results(second.directory), second.draws),
+            _FinishedRun(first.name, read_results(first.directory, first.origins), first.draws),
+            _FinishedRun(second.name, read_results(second.directory, second.origins), second.draws),
         )
         numbers = _compared_numbers(runs[0].results, runs[1].results)
         draws = _compared_draws(numbers, runs)

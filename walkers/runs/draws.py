@@ -40,8 +40,10 @@ class Unknown:
         Both ends of its range in SI units.
     logarithmic
         Whether the range is log-uniform.
-    text, range_text
-        The value and the range as case files have them: ``0.2``, ``0.1 to 0.6``.
+    text
+        The value as case files have it: ``0.2``.
+    ends
+        Both ends of the range as case files have them: numbers, or texts such as ``29 um``.
     """
 
     value: float | str
@@ -49,7 +51,12 @@ class Unknown:
     high: float
     logarithmic: bool
     text: str = field(compare=False)
-    range_text: str = field(compare=False)
+    ends: tuple[float | str, float | str] = field(compare=False)
+
+    @property
+    def range_text(self) -> str:
+        """The range as text: ``0.1 to 0.6``."""
+        return " to ".join(map(str, self.ends))
 
 
 @dataclass(frozen=True)
@@ -125,6 +132,9 @@ class ComparedDraws:
     other_unknowns
         The other unknowns as sentences, such as ``contact.friction.bead_wall 0.1 to 0.6, and 0.2 to
         0.4``. If there are any, draws cannot be paired.
+    for_first, for_second
+        What each case must take over from the other for pairs, by the keys: the unknowns that it
+        lacks; the second case also those that it has with another value or range.
     """
 
     quantity: str
@@ -134,6 +144,8 @@ class ComparedDraws:
     independent: PairsOfDraws
     common_unknowns: Sequence[str]
     other_unknowns: Sequence[str]
+    for_first: Mapping[str, Unknown]
+    for_second: Mapping[str, Unknown]
 
 
 def compare_draws(first: Draws, second: Draws, quantity: str, unit: str) -> ComparedDraws | None:
@@ -175,7 +187,21 @@ def compare_draws(first: Draws, second: Draws, quantity: str, unit: str) -> Comp
         independent=_pairs(every_first, every_second, unit),
         common_unknowns=_common_unknowns(first.unknowns, second.unknowns),
         other_unknowns=other_unknowns,
+        for_first=_lacking(first.unknowns, second.unknowns),
+        for_second=_different(second.unknowns, first.unknowns),
     )
+
+
+def _lacking(case: Mapping[str, Unknown], other_case: Mapping[str, Unknown]) -> dict[str, Unknown]:
+    """The unknowns of the other case that a case lacks."""
+    return {key: unknown for key, unknown in other_case.items() if key not in case}
+
+
+def _different(
+    case: Mapping[str, Unknown], other_case: Mapping[str, Unknown]
+) -> dict[str, Unknown]:
+    """The unknowns of the other case that a case lacks, or has with another value or range."""
+    return {key: unknown for key, unknown in other_case.items() if case.get(key) != unknown}
 
 
 def _common_unknowns(first: Mapping[str, Unknown], second: Mapping[str, Unknown]) -> list[str]:

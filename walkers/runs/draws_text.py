@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import json
+from collections.abc import Iterable, Mapping, Sequence
 
 from walkers.postprocess.measure.quantities import unit_shown
 from walkers.postprocess.measure.uncertainty import few_draws
 from walkers.rounding import percent, rounded
-from walkers.runs.draws import Band, ComparedDraws, PairsOfDraws
+from walkers.runs.draws import Band, ComparedDraws, PairsOfDraws, Unknown
 from walkers.terminal import table_width, wrapped
 from walkers.text import aligned_blocks, with_unit
 
@@ -33,7 +34,22 @@ def compared_draws_text(compared: ComparedDraws, first: str, second: str) -> str
         *assumptions([compared]),
         *reasons(compared),
     ]
-    return "\n".join([aligned_blocks(rows, table_width()), *wrapped_sentences(sentences)])
+    lines = [aligned_blocks(rows, table_width()), *wrapped_sentences(sentences)]
+    for name, unknowns in ((first, compared.for_first), (second, compared.for_second)):
+        if compared.common is None and unknowns:
+            lines += _uncertain_table(name, unknowns)
+    return "\n".join(lines)
+
+
+def _uncertain_table(name: str, unknowns: Mapping[str, Unknown]) -> list[str]:
+    """Lines for the file of a case: ranges, and in comments the values that belong to them."""
+    lines = [f"for {name}:", "  [uncertain]"]
+    for key, unknown in unknowns.items():
+        ends = json.dumps(unknown.ends, ensure_ascii=False)
+        if unknown.logarithmic:
+            ends = f"{{ loguniform = {ends} }}"
+        lines.append(f"  {key} = {ends} # around {unknown.text}")
+    return lines
 
 
 def rows_of(compared: ComparedDraws) -> list[list[str]]:
@@ -126,8 +142,8 @@ def reasons(compared: ComparedDraws) -> list[str]:
     if compared.common_unknowns:
         sentences.append(f"the same in both: {', '.join(compared.common_unknowns)}")
     sentences.append(
-        "to pair the draws, give both cases the same values, and the same ranges in [uncertain], "
-        "and run both with --spread"
+        "to pair the draws, give both cases the same values in their tables, and the same ranges "
+        "in [uncertain], as below, and run both with --spread"
     )
     return sentences
 

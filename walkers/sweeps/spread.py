@@ -513,7 +513,7 @@ def _unknown_of(value: Mapping[str, Any]) -> Unknown:
         high=high,
         logarithmic=value["logarithmic"],
         text=value["text"],
-        range_text=" to ".join(map(str, value["range"])),
+        ends=(value["range"][0], value["range"][1]),
     )
 
 

@@ -13,9 +13,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from walkers.errors import InputError, input_error
+from walkers.errors import InputError, input_error, suggestion
 from walkers.files import read_json, write_json
 from walkers.inputs.resolving.length import limits_of
 from walkers.inputs.resolving.loads import softness_warning
@@ -86,19 +86,30 @@ class Results(dict[str, Any]):
     """The result of a run: numbers in SI units by name; NaN if one is not defined.
 
     It contains both ends of bands (``velocity_low``, ``velocity_high``) and numerical errors if
-    these exist.
+    these exist. A name that it lacks raises a `KeyError` with a suggestion.
 
     Attributes
     ----------
-    directory
+    directory : Path
         The run directory.
-    warnings
+    warnings : list of str
         Reasons to doubt the numbers.
-    about
-        ``case``, ``drive``, ``rests_on``
-        (`walkers.postprocess.measure.uncertainty.uncertain_values`), ``by_hand`` (notes on a deck
-        that was run by hand), ``deck_edited`` (whether its parameters or commands are not those of
-        the program), ``tables`` (their names).
+    about : dict
+        What the numbers belong to:
+
+        ``case``
+            Name of the case.
+        ``drive``
+            The drive in a few words, such as ``80 Hz, a0 = 39.2 m/s²``.
+        ``rests_on``
+            The values of the case that nobody has measured for it, a dictionary each
+            (`walkers.postprocess.measure.uncertainty.uncertain_values`).
+        ``by_hand``
+            Notes on a deck that was run by hand; empty for other runs.
+        ``deck_edited``
+            Whether parameters or commands of such a deck are not those of the program.
+        ``tables``
+            Names of the tables that `table` reads.
     """
 
     def __init__(
@@ -112,6 +123,10 @@ class Results(dict[str, Any]):
         self.directory = directory
         self.warnings = warnings
         self.about = about
+
+    def __missing__(self, name: object) -> NoReturn:
+        """Refuse the name of a number that the result does not have."""
+        raise KeyError(f"the result has no number {name}{suggestion(str(name), self)}")
 
     def columns(self, table: str) -> Columns:
         """A table as arrays."""
