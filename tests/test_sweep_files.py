@@ -254,11 +254,6 @@ def test_the_shipped_sweep_of_trays_varies_number_and_coverage() -> None:
             id="key on two axes",
         ),
         pytest.param(
-            {"set": {"run": {"seed": 3}}, "axes": {"run.seed": [1, 2]}},
-            r"run.seed: varies on an axis; expected none in \[set\]",
-            id="key on an axis and in set",
-        ),
-        pytest.param(
             {"axes": {"drive": {"frequency": ["60 Hz"]}, "drive.frequency": ["70 Hz"]}},
             "drive.frequency: is given twice; expected one value",
             id="key in two notations",

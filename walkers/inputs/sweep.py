@@ -347,13 +347,11 @@ def expand(
 
 
 def _check_keys(settings: Collection[str], keys: Collection[str]) -> None:
-    """Refuse keys of ``[set]`` and of axes that no case has, or that exclude each other."""
+    """Refuse keys of ``[set]`` and of axes that no case has, and axes that exclude each other."""
     if "title" in keys:
         raise key_error("title", "expected another key, for title does not determine a run")
     apply_all(partial(check_key, CaseFile), (*settings, *keys))
     for key in keys:
-        if key in settings:
-            raise key_error(key, "varies on an axis; expected none in [set]")
         for excluded in alternatives(CaseFile, key).intersection(keys):
             message = f"expected one of {key} and {excluded}, which replace each other"
             raise key_error(key, message)
