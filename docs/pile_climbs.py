@@ -52,19 +52,15 @@ GROUPS = (
             "pile-laws": (
                 "Coulomb 0.35",
                 "0.5 on walls, 0.28",
-                "0.28, growing on walls",
-                "0.28, growing between beads",
                 "0.28, growing at 94 mm/s",
             ),
         },
     ),
     Group("friction 0.5, other liquids", {"pile-liquids": ("ethylene glycol", "silicone oil AK5")}),
     Group(
-        "friction 0.5, without a condition",
-        {"pile-controls": ("large beads alone", "small beads alone", "dry", "cylinder")},
+        "friction 0.5, another container",
+        {"pile-cylinder": ("cylinder",)},
     ),
-    Group("friction 0.5, longer time step", {"pile-steps": ("2.34 µs a step",)}),
-    Group("the paper's box, 1,630 beads", {"pile-paper": ("0.28, growing, in the box",)}),
 )
 """The conditions of figure and table."""
 SWEEPS = tuple(chain.from_iterable(group.labels for group in GROUPS))
@@ -76,6 +72,8 @@ _CURVES = {
     _GROWING: "#d95f02",
 }
 """Colours of the curves of (a): the darker, the larger a friction of Coulomb's law."""
+_WITH_BANDS = (_AS_SHIPPED, _GROWING)
+"""The curves that are drawn with their 95 % bands."""
 _PARTS = (
     ("all", None, "ko"),
     ("plain walls", "on_plain_walls", "C1s"),
@@ -121,7 +119,7 @@ def write_statistics(name: str, out: Path, docs: Path) -> None:
     conditions = climb([sweep(name, out).directory])
     for condition in conditions:
         del condition["each"]  # the climbs one by one
-    write_json(docs / file_of(name), conditions)
+    write_json(docs / file_of(name), {"conditions": conditions})
 
 
 def statistics_in(docs: Path) -> Statistics:
@@ -129,7 +127,8 @@ def statistics_in(docs: Path) -> Statistics:
     statistics: Statistics = {}
     for group in GROUPS:
         for name, labels in group.labels.items():
-            statistics |= zip(labels, read_json(docs / file_of(name)), strict=True)
+            conditions = read_json(docs / file_of(name))["conditions"]
+            statistics |= zip(labels, conditions, strict=True)
     return statistics
 
 
@@ -154,14 +153,15 @@ def figure_of(statistics: Statistics) -> Figure:
 
 
 def _draw_shares(axes: Axes, statistics: Statistics) -> None:
-    """The share of piles that have climbed against the time of the drive, with its band."""
+    """The share of piles that have climbed against the time of the drive."""
     for label, colour in _CURVES.items():
         curve = statistics[label]["curve"]
         time = np.array(curve["time"], dtype=float)
         share, low, high = (
             np.array(curve[name], dtype=float) for name in ("probability", "low", "high")
         )
-        axes.fill_between(time, low, high, step="post", color=colour, alpha=0.15, linewidth=0.0)
+        if label in _WITH_BANDS:
+            axes.fill_between(time, low, high, step="post", color=colour, alpha=0.15, linewidth=0.0)
         axes.step(time, share, color=colour, where="post", label=label)
     axes.set(
         xlabel="time of the drive (s)",
