@@ -71,6 +71,7 @@ def list_(
     refuse("--to", to is not None, "expected a sweep, whose table is written")
     entries = listing.inventory(out)
     usual = listing.without_members(entries)
+    usual_names = {entry.name for entry in usual}
     shown = entries if every else usual
     hidden = len(entries) - len(shown)
     usually_hidden = 0
@@ -78,7 +79,7 @@ def list_(
         searched = entries if every else listing.without_draws(entries)
         shown = select([entry for entry in searched if entry.kind == "run"], where)
         hidden = 0
-        usually_hidden = len([entry for entry in shown if entry not in usual])
+        usually_hidden = len({entry.name for entry in shown} - usual_names)
     print_as(
         as_json,
         lambda: listing.as_json(shown),

@@ -346,7 +346,7 @@ def expand(
     )
 
 
-def _check_keys(settings: Collection[str], keys: Collection[str]) -> None:
+def _check_keys(settings: Iterable[str], keys: Collection[str]) -> None:
     """Refuse keys of ``[set]`` and of axes that no case has, and axes that exclude each other."""
     if "title" in keys:
         raise key_error("title", "expected another key, for title does not determine a run")

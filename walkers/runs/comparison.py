@@ -46,7 +46,7 @@ from walkers.text import aligned_blocks, with_unit
 
 if TYPE_CHECKING:
     from walkers.inputs.origins import Origin
-from walkers.inputs.tables.case import Case
+    from walkers.inputs.tables.case import Case
 
 _VELOCITIES = ("velocity", "right_facing", "left_facing")
 """Numbers whose scatter is in the result."""
