@@ -85,9 +85,7 @@ def write_vtk(
     check_limits("every", every, 1, whole=True)
     destination = destination or directory / "vtk"
     earlier_files = files_of_earlier_export(destination, _names_of_export(destination))
-    motion = read_motion(directory)
-    if motion.case.boundary.is_open_floor:
-        motion = gathered(motion)
+    motion = _shown_motion(directory)
     with filled_folder(destination, earlier_files, VTK_SCRATCH) as new:
         listed = _write_frames(new, motion, _frames_to_write(motion, every))
         _write_collection(new, motion, listed)
@@ -148,9 +146,7 @@ class GrowingVtk:
             The directory of the finished run.
         """
         self._listed = []
-        motion = read_motion(directory)
-        if motion.case.boundary.is_open_floor:
-            motion = gathered(motion)
+        motion = _shown_motion(directory)
         self._add(motion, _frames_to_write(motion, self._every))
 
     def _add(self, motion: Motion, frames: Sequence[int]) -> None:
@@ -171,6 +167,14 @@ class GrowingVtk:
         """Write frames and the list of these and the earlier ones into a new folder."""
         self._listed += _write_frames(folder, motion, frames)
         _write_collection(folder, motion, self._listed)
+
+
+def _shown_motion(directory: Path) -> Motion:
+    """The motion of a finished run; walkers of an open floor are side by side."""
+    motion = read_motion(directory)
+    if motion.case.boundary.is_open_floor:
+        return gathered(motion)
+    return motion
 
 
 def _frames_to_write(motion: Motion, every: int | None) -> range:
