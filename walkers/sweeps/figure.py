@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil
 from textwrap import wrap
@@ -16,10 +15,8 @@ import numpy.typing as npt
 from walkers.arrays import FloatArray
 from walkers.errors import expected_of, input_error
 from walkers.inputs.resolving.library import unmeasured
-from walkers.inputs.tables.case import Case
 from walkers.postprocess.measure.caption import common_conditions
 from walkers.postprocess.measure.numbers import draws_text
-from walkers.postprocess.measure.results import Results
 from walkers.postprocess.show.drawing import (
     errors_seen,
     letter_panels,
@@ -27,7 +24,6 @@ from walkers.postprocess.show.drawing import (
     plain_text,
     styled,
 )
-from walkers.runner.run_directory import case_of
 from walkers.runs.status import status_text
 from walkers.sweeps.correlations import rank_correlations
 from walkers.sweeps.factors import Factor, number_factor
@@ -125,18 +121,9 @@ def figure_of(
         theory=theory,
         point_files=point_files,
         format=figure_format,
-        conditions=common_conditions(_readable_cases(table.results.values())),
+        conditions=common_conditions(list(table.readable_cases.values())),
     )
     return _draw(content, log)
-
-
-def _readable_cases(results: Iterable[Results]) -> list[Case]:
-    """The cases of results, without those whose run was damaged after it was measured."""
-    cases = []
-    for result in results:
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            cases.append(case_of(result.directory))
-    return cases
 
 
 def _tell_left_out(frame: pd.DataFrame, finished: pd.DataFrame, column: str) -> None:

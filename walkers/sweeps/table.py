@@ -21,6 +21,7 @@ import io
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import nan
@@ -139,13 +140,26 @@ class SweepTable:
         return self.frame[self.frame["status"] == "finished"]
 
     @cached_property
-    def cases(self) -> Mapping[int, Case]:
+    def readable_cases(self) -> Mapping[int, Case]:
         """Cases of the finished points by their numbers, as their runs have recorded them.
 
-        To expand the record again would take three times as long, and it would give the values of
-        today's library.
+        Those of runs that were damaged after they had been measured are left out. To expand the
+        record again would take three times as long, and it would give the values of today's
+        library.
         """
-        return {point: case_of(result.directory) for point, result in self.results.items()}
+        cases = {}
+        for point, result in self.results.items():
+            with suppress(OSError, ValueError, KeyError, TypeError):
+                cases[point] = case_of(result.directory)
+        return cases
+
+    @cached_property
+    def cases(self) -> Mapping[int, Case]:
+        """The `readable_cases`, which must be those of all finished points."""
+        for point, result in self.results.items():
+            if point not in self.readable_cases:
+                case_of(result.directory)  # says what is wrong with it
+        return self.readable_cases
 
     def results_of(self, rows: pd.DataFrame) -> list[Results]:
         """The results of some rows of the table, once for each run."""
