@@ -291,6 +291,14 @@ def _rate(events: int, seconds: float) -> dict[str, Any]:
     }
 
 
+def _interval_of_share(part: int, whole: int) -> list[float]:
+    """The exact interval of a share of so many (Clopper and Pearson 1934)."""
+    from scipy.stats import binomtest
+
+    ends = binomtest(part, whole).proportion_ci(CONFIDENCE)
+    return [float(ends.low), float(ends.high)]
+
+
 def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:
     """Test whether large beads lead climbs more often than expected by chance.
 
@@ -314,8 +322,6 @@ def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:
     -----
     Climbs of one run are not independent: a bead that leads twice counts twice in each draw.
     """
-    from scipy.stats import binomtest
-
     generator = np.random.default_rng(0)
     led_by_large = int(climbs["leader_large"].sum())
     drawn = np.zeros(DRAWS)
@@ -333,8 +339,7 @@ def leaders(piles: pd.DataFrame, climbs: pd.DataFrame) -> dict[str, Any]:
     if len(climbs):
         probability = float((1 + (drawn >= led_by_large).sum()) / (1 + DRAWS))
         share = led_by_large / len(climbs)
-        ends = binomtest(led_by_large, len(climbs)).proportion_ci(CONFIDENCE)
-        interval = [float(ends.low), float(ends.high)]
+        interval = _interval_of_share(led_by_large, len(climbs))
     return {
         "led_by_large": led_by_large,
         "share_led_by_large": share,
@@ -378,7 +383,7 @@ def survival(first: FloatArray, watched: FloatArray, deadline: float) -> dict[st
     records ended before the time and some, but not all, have the event. Otherwise it is the exact
     binomial interval of Clopper and Pearson (1934; ``Clopper-Pearson``).
     """
-    from scipy.stats import CensoredData, binomtest, ecdf
+    from scipy.stats import CensoredData, ecdf
 
     censored = first > watched
     long_enough = watched >= deadline * (1.0 - _SAME_LENGTH)
@@ -399,8 +404,7 @@ def survival(first: FloatArray, watched: FloatArray, deadline: float) -> dict[st
         interval = [float(band.low.evaluate(deadline)), float(band.high.evaluate(deadline))]
     elif probability is not None:
         followed = int((long_enough | (first <= np.minimum(watched, deadline))).sum())
-        exact = binomtest(climbed, followed).proportion_ci(CONFIDENCE)
-        interval = [float(exact.low), float(exact.high)]
+        interval = _interval_of_share(climbed, followed)
     times_of_half = share.quantiles[share.probabilities >= 0.5]
     times = np.array([0.0, *np.unique(share.quantiles)])
     return {
