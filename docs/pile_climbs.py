@@ -12,14 +12,13 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from matplotlib.figure import Figure
 
 from walkers import sweep
 from walkers.api import climb
 from walkers.files import read_json, write_json
 from walkers.postprocess.show.drawing import TWO_COLUMNS, letter_panels, new_figure, styled
-from walkers.sweeps.climbing_output import texts_of
+from walkers.sweeps.climbing_output import draw_rates, draw_survival, texts_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Group:
-    """Conditions that a panel shows together.
+    """Conditions that stand together in the panel of rates.
 
     Attributes
     ----------
@@ -49,18 +48,11 @@ GROUPS = (
         {
             "pile-frictions": ("Coulomb 0.28", _GROWING),
             "pile-starts": (_AS_SHIPPED,),
-            "pile-laws": (
-                "Coulomb 0.35",
-                "0.5 on walls, 0.28",
-                "0.28, growing at 94 mm/s",
-            ),
+            "pile-laws": ("Coulomb 0.35", "0.5 on walls, 0.28", "0.28, growing at 94 mm/s"),
         },
     ),
     Group("friction 0.5, other liquids", {"pile-liquids": ("ethylene glycol", "silicone oil AK5")}),
-    Group(
-        "friction 0.5, another container",
-        {"pile-cylinder": ("cylinder",)},
-    ),
+    Group("friction 0.5, another container", {"pile-cylinder": ("cylinder",)}),
 )
 """The conditions of figure and table."""
 SWEEPS = tuple(chain.from_iterable(group.labels for group in GROUPS))
@@ -74,12 +66,6 @@ _CURVES = {
 """Colours of the curves of (a): the darker, the larger a friction of Coulomb's law."""
 _WITH_BANDS = (_AS_SHIPPED, _GROWING)
 """The curves that are drawn with their 95 % bands."""
-_PARTS = (
-    ("all", None, "ko"),
-    ("plain walls", "on_plain_walls", "C1s"),
-    ("corners", "in_corners", "C2^"),
-)
-"""Label, key and marker of all climbs, and of those on plain walls and in corners."""
 _COLUMNS = (
     "climbed",
     "half by (s)",
@@ -155,14 +141,10 @@ def figure_of(statistics: Statistics) -> Figure:
 def _draw_shares(axes: Axes, statistics: Statistics) -> None:
     """The share of piles that have climbed against the time of the drive."""
     for label, colour in _CURVES.items():
-        curve = statistics[label]["curve"]
-        time = np.array(curve["time"], dtype=float)
-        share, low, high = (
-            np.array(curve[name], dtype=float) for name in ("probability", "low", "high")
-        )
+        band = None
         if label in _WITH_BANDS:
-            axes.fill_between(time, low, high, step="post", color=colour, alpha=0.15, linewidth=0.0)
-        axes.step(time, share, color=colour, where="post", label=label)
+            band = {"color": colour, "alpha": 0.15, "linewidth": 0.0}
+        draw_survival(axes, statistics[label]["curve"], colour, band=band, label=label)
     axes.set(
         xlabel="time of the drive (s)",
         ylabel="share of piles that have climbed",
@@ -185,19 +167,7 @@ def _draw_rates(axes: Axes, statistics: Statistics) -> None:
                 places.append(place)
                 ticks.append(label)
         place += 1.2
-    for number, (name, key, marker) in enumerate(_PARTS):
-        parts = [statistics[label] if key is None else statistics[label][key] for label in ticks]
-        rates = np.array([part["rate"] for part in parts])
-        ends = np.array([part["rate_interval"] for part in parts])
-        axes.errorbar(
-            rates,
-            np.array(places) + 0.22 * (number - 1),
-            xerr=[rates - ends[:, 0], ends[:, 1] - rates],
-            fmt=marker,
-            linestyle="none",
-            markersize=3.0,
-            label=name,
-        )
+    draw_rates(axes, [statistics[label] for label in ticks], places)
     axes.set_yticks(places, ticks)
-    axes.set(xlabel="climbs per pile and second", xlim=(0.0, None), ylim=(place - 0.5, -0.7))
+    axes.set(xlabel="climbs per pile and second", ylim=(place - 0.5, -0.7))
     axes.legend(loc="lower right")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from walkers.arrays import IntArray
 from walkers.files import write_bytes
 from walkers.postprocess.measure.uncertainty import OF_OTHERS
 from walkers.postprocess.show.drawing import (
@@ -197,29 +198,51 @@ def climbs_figure(climbs: Sequence[Mapping[str, Any]]) -> Figure:
     mosaic: list[Any] = [["survival", "climbs"], ["rates", "rates"]]
     figure = new_figure(TWO_COLUMNS, _ROW_HEIGHT * sum(heights))
     axes = figure.subplot_mosaic(mosaic, height_ratios=heights)
-    _draw_survival(axes["survival"], climbs[0]["curve"])
+    draw_survival(axes["survival"], climbs[0]["curve"], "k", band={"color": "0.85"})
+    axes["survival"].set(
+        xlabel="time of drive (s)",
+        ylabel="share that has climbed",
+        ylim=(0.0, 1.02),
+        xlim=(0.0, None),
+    )
     _draw_speeds(axes["climbs"], climbs[0]["each"])
-    _draw_rates(axes["rates"], climbing_table(climbs))
+    _draw_rates_of_conditions(axes["rates"], climbs)
     letter_panels(axes.values())
     handles, labels = axes["rates"].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(_SUBSETS))
     return figure
 
 
-def _draw_survival(axes: Axes, curve: Mapping[str, Sequence[float | None]]) -> None:
-    """The share of piles that have climbed against the time of the drive, with its band."""
+def draw_survival(
+    axes: Axes,
+    curve: Mapping[str, Sequence[float | None]],
+    colour: str,
+    *,
+    band: Mapping[str, Any] | None = None,
+    label: str = "",
+) -> None:
+    """Draw the share of piles that have climbed against the time of the drive.
+
+    Parameters
+    ----------
+    axes
+        The axes.
+    curve
+        The item ``curve`` of `walkers.sweeps.climbing.survival`.
+    colour
+        Colour of the line.
+    band
+        The look of its 95 % band, for matplotlib; None: no band.
+    label
+        Entry of the legend; empty: none.
+    """
     time = np.array(curve["time"], dtype=float)
     share = np.array(curve["probability"], dtype=float)
-    low = np.array(curve["low"], dtype=float)
-    high = np.array(curve["high"], dtype=float)
-    axes.step(time, share, "k", where="post")
-    axes.fill_between(time, low, high, step="post", color="0.85")
-    axes.set(
-        xlabel="time of drive (s)",
-        ylabel="share that has climbed",
-        ylim=(0.0, 1.02),
-        xlim=(0.0, None),
-    )
+    axes.step(time, share, color=colour, where="post", label=label)
+    if band is not None:
+        low = np.array(curve["low"], dtype=float)
+        high = np.array(curve["high"], dtype=float)
+        axes.fill_between(time, low, high, step="post", **band)
 
 
 def _draw_speeds(axes: Axes, climbs: Sequence[Mapping[str, Any]]) -> None:
@@ -249,30 +272,48 @@ def _is_in_corner(climb: Mapping[str, Any]) -> bool:
     return bool(climb["walls"] >= WALLS_OF_CORNER)
 
 
-def _draw_rates(axes: Axes, table: pd.DataFrame) -> None:
-    """Rates with their exact intervals, one condition below the other."""
+def draw_rates(
+    axes: Axes, climbs: Sequence[Mapping[str, Any]], places: Sequence[float] | IntArray
+) -> None:
+    """Draw rates with their exact intervals: of all climbs, on plain walls and in corners.
+
+    Parameters
+    ----------
+    axes
+        The axes.
+    climbs
+        Results of `walkers.api.climb`.
+    places
+        Height of each condition; their distance is at least 1.
+    """
+    table = climbing_table(climbs)
     for number, subset in enumerate(_SUBSETS):
         rows = table[table["where"] == subset.label]
-        places = np.arange(len(rows)) + 0.2 * (number - 1)  # one subset below the other
         rates = rows["rate"].astype(float)  # NaN without a drive
         errors = [rates - rows["rate_low"], rows["rate_high"] - rates]
         axes.errorbar(
             rates,
-            places,
+            np.array(places) + 0.2 * (number - 1),  # one subset below the other
             xerr=errors,
             fmt=subset.marker,
             label=subset.label,
             linestyle="none",
             markersize=3.0,
         )
+    axes.set(xlabel="climbs per run and second", xlim=(0.0, None))
+
+
+def _draw_rates_of_conditions(axes: Axes, climbs: Sequence[Mapping[str, Any]]) -> None:
+    """Draw the rates of conditions, one below the other, with their values at the axis."""
+    draw_rates(axes, climbs, np.arange(len(climbs)))
     labels = []
-    for row in table[table["where"] == _ALL.label].to_dict("records"):
+    for numbers in climbs:
         # The condition with the last word of each key, such as ``frequency 100 Hz``.
-        condition = re.sub(r"[\w.\[\]]*?(\w+) = ", r"\1 ", row["condition"])
-        label = f"{condition}: {row['climbed']}/{row['runs']} climbed"
+        condition = re.sub(r"[\w.\[\]]*?(\w+) = ", r"\1 ", numbers["condition"])
+        label = f"{condition}: {numbers['climbed']}/{numbers['runs']} climbed"
         labels.append(plain_text(fill(label, _LETTERS_OF_LABEL)))
     axes.set_yticks(range(len(labels)), labels)
-    axes.set(xlabel="climbs per run and second", xlim=(0.0, None), ylim=(len(labels) - 0.5, -0.5))
+    axes.set_ylim(len(labels) - 0.5, -0.5)
 
 
 def write_climbs(climbs: Sequence[Mapping[str, Any]], runs: Sequence[str], to: Path) -> None:
