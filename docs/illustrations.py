@@ -20,7 +20,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -125,8 +125,14 @@ def _cases_of_sweeps(names: Iterable[str]) -> list[Case]:
     """The cases of shipped sweeps."""
     cases: list[Case] = []
     for name in names:
-        cases += load_sweep(name).cases()
+        cases += _cases_of_sweep(name)
     return cases
+
+
+@cache
+def _cases_of_sweep(name: str) -> tuple[Case, ...]:
+    """The cases of a shipped sweep, which several illustrations may show."""
+    return tuple(load_sweep(name).cases())
 
 
 def _shipped_cases(*names: str) -> list[Case]:
